@@ -1,11 +1,9 @@
 //! From how many taps per phase on does overlap-save take less time than the direct algorithm?
 //!
-//! `cargo bench --bench algorithm_crossover` measures both along a ladder of K for several N and M,
-//! overlap-save with the four shortest transforms that hold a block of K frames, in nanoseconds per frame
-//! (best of many repeats), and sets beside them what the plan chooses. The constants of the plan's cost
-//! model (`runtime/src/algorithms/choice.rs`) were fitted to this table. Words after `--`: `f64` for double
-//! precision, and the name of an instruction set (`portable`, `avx2`, `avx512`) for that set instead of the
-//! widest one.
+//! `cargo bench --bench algorithm_crossover` measures both along a ladder of K for several N and M, in
+//! nanoseconds per frame (best of many repeats), and sets beside them what the plan chooses. Words after
+//! `--`: `f64` for double precision, and the name of an instruction set (`portable`, `avx2`, `avx512`) for
+//! that set instead of the widest one.
 
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::runtime::{Algorithm, Isa, Options, Precision, Stream};
@@ -55,30 +53,17 @@ fn main() {
     let asked = |wanted: &str| std::env::args().any(|word| word == wanted);
     let isa = Isa::available().find(|isa| asked(isa.name())).unwrap_or_else(Isa::detect);
     let precision = if asked("f64") { Precision::Double } else { Precision::Single };
-    println!("| N | M | K | direct, ns per frame | overlap-save, F: ns per frame | the plan |");
+    println!("| N | M | K | direct, ns per frame | overlap-save, ns per frame | the plan |");
     println!("|---|---|---|---|---|---|");
     for (n, m) in SHAPES {
         for k in LAGS {
             let bank = fir(n, m, k * m);
             let options = |algorithm| Options { precision, algorithm, isa };
-            let direct = measure(&bank, options(Algorithm::Direct));
-            let shortest = (2 * k).next_power_of_two().max(16);
-            let lengths = (0..4).map(|i| shortest << i);
-            let others: Vec<_> = lengths
-                .map(|len| {
-                    format!(
-                        "{len}: {:.2}",
-                        measure(&bank, options(Algorithm::OverlapSave { transform: Some(len) }))
-                    )
-                })
-                .collect();
+            let [direct, transforms] = [Algorithm::Direct, Algorithm::OverlapSave]
+                .map(|algorithm| measure(&bank, options(algorithm)));
             let plan = bank.plan(options(Algorithm::Auto)).unwrap().summary();
             let length = plan.transform.map_or(String::new(), |len| format!(" {len}"));
-            println!(
-                "| {n} | {m} | {k} | {direct:.2} | {} | {}{length} |",
-                others.join(", "),
-                plan.algorithm
-            );
+            println!("| {n} | {m} | {k} | {direct:.2} | {transforms:.2} | {}{length} |", plan.algorithm);
         }
     }
 }

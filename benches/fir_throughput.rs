@@ -145,16 +145,13 @@ impl Table {
 
     /// Overlap-save; the products are those of the direct algorithm.
     fn blocks(&self, name: &str, n: usize, m: usize, taps: usize) {
-        for len in [None, Some(64), Some(128), Some(256)] {
-            let options = Options { algorithm: Algorithm::OverlapSave { transform: len }, ..self.options() };
-            let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
-            let x = input(n, FRAMES);
-            let mut y = vec![0.0; m * FRAMES];
-            let name = format!("{name} {}", len.map_or("best".into(), |len| len.to_string()));
-            self.row(&name, m * FRAMES, (n * taps) as f64 / m as f64, || {
-                stream.process(black_box(&x), &mut y).unwrap();
-            });
-        }
+        let options = Options { algorithm: Algorithm::OverlapSave, ..self.options() };
+        let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
+        let x = input(n, FRAMES);
+        let mut y = vec![0.0; m * FRAMES];
+        self.row(name, m * FRAMES, (n * taps) as f64 / m as f64, || {
+            stream.process(black_box(&x), &mut y).unwrap();
+        });
     }
 
     /// In and out as f64; the peak in f64 is half the one printed.
@@ -176,7 +173,7 @@ impl Table {
         self.row(name, m * FRAMES, (n * taps) as f64 / m as f64, || {
             let frames = PcmFrames { layout, channels: n, bytes: black_box(&bytes) };
             let mut output = PcmOutput::packed(PcmFormat::S16Le, &mut out);
-            stream.run(&[frames][..], &mut output).unwrap();
+            stream.run(&[frames].as_slice(), &mut output).unwrap();
         });
     }
 
@@ -200,7 +197,7 @@ impl Table {
             one = one.min(start.elapsed());
             let start = Instant::now();
             let frames = Interleaved::new(black_box(&x), n).unwrap();
-            stream.run_parallel(&frames, &mut y[..], &pool).unwrap();
+            stream.run_parallel(&frames, &mut y.as_mut_slice(), &pool).unwrap();
             two = two.min(start.elapsed());
         }
         let (one, two) = (one.as_secs_f64(), two.as_secs_f64());

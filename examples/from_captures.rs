@@ -63,7 +63,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let plan = bank.plan(settings.options(Options::default()))?;
     let channels: Vec<&[f64]> = tone.iter().map(Vec::as_slice).collect();
     let mut output = vec![0.0f64; FRAMES * bank.ratio];
-    let outcome = fuse(&bank, &plan, &[Planar::new(&channels)?], &mut output[..], settings, &|| false)?;
+    let outcome =
+        fuse(&bank, &plan, &[&Planar::new(&channels)?], &mut output.as_mut_slice(), settings, &|| false)?;
     let affected = outcome.mask.iter().flatten().filter(|&&mark| mark == 1).count();
     println!("{} samples, {affected} of them affected by the gap", outcome.samples);
 

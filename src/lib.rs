@@ -5,7 +5,6 @@
 
 #[cfg(feature = "files")]
 pub mod files;
-pub mod memory;
 pub mod messages;
 #[cfg(feature = "files")]
 pub mod npy;

@@ -12,7 +12,8 @@
 //! assert_eq!((PROGRAM.end(run(48_000)), PROGRAM.end(run(0))), (ExitCode::SUCCESS, ExitCode::from(2)));
 //! ```
 
-use crate::files::{StandardStream, leftovers, stderr, stdout, unprinted};
+pub mod interrupts;
+
 use crate::messages::{Quoted, printable, quoted_usage, shown};
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::path::Path;
@@ -34,7 +35,7 @@ impl Failure {
     pub fn printing(error: &io::Error) -> Self {
         match error.kind() {
             ErrorKind::BrokenPipe => Self::ClosedPipe,
-            _ => Self::Input(unprinted(error)),
+            _ => Self::Input(format!("standard output: cannot write it: {error}")),
         }
     }
 
@@ -68,33 +69,32 @@ impl Program {
         self.say_line(&format!("warning: {warning}"));
     }
 
-    /// Names the unfinished files that killed runs left beside `outputs`.
-    pub fn name_leftovers(&self, outputs: &[&Path]) {
-        leftovers(outputs).iter().for_each(|left| self.warn(&left.to_string()));
-    }
-
     /// The exit code, after the message of a failure.
     pub fn end(&self, outcome: Result<(), Failure>) -> ExitCode {
-        let (message, code) = match outcome {
-            Ok(()) | Err(Failure::ClosedPipe) => return ExitCode::SUCCESS,
-            Err(Failure::Input(message)) => (message, 1),
-            Err(Failure::Usage(message)) => (message, 2),
+        outcome.map_or_else(|failure| self.fail(failure).into(), |()| ExitCode::SUCCESS)
+    }
+
+    /// Says why the program fails; its exit code.
+    pub fn fail(&self, failure: Failure) -> u8 {
+        let (message, code) = match failure {
+            Failure::ClosedPipe => return 0,
+            Failure::Input(message) => (message, 1),
+            Failure::Usage(message) => (message, 2),
         };
         self.say_line(&message);
-        ExitCode::from(code)
+        code
     }
 
     /// Shows help, the version or what is wrong with the usage; the exit code.
     pub fn show(&self, message: &clap::Error) -> ExitCode {
-        let open = if message.use_stderr() { Ok(()) } else { StandardStream::Output.check() };
-        let print = || match quoted_usage(message) {
+        let printed = match quoted_usage(message) {
             None => message.print(),
             Some(text) => {
                 say(&text);
                 Ok(())
             }
         };
-        match open.and_then(|()| print()) {
+        match printed {
             Err(error) if !message.use_stderr() => self.end(Err(Failure::printing(&error))),
             _ => ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2)),
         }
@@ -114,8 +114,8 @@ pub fn print(text: &str) -> Result<(), Failure> {
 /// # Errors
 /// [`Failure::printing`].
 pub fn print_bytes(bytes: &[u8]) -> Result<(), Failure> {
-    let mut stdout = stdout();
-    let written = StandardStream::Output.check().and_then(|()| stdout.write_all(bytes));
+    let mut stdout = io::stdout().lock();
+    let written = stdout.write_all(bytes);
     written.and_then(|()| stdout.flush()).map_err(|error| Failure::printing(&error))
 }
 
@@ -127,7 +127,7 @@ pub fn say(text: &str) {
 /// Every word on standard error comes this way, and nothing foreign is left in it. What cannot be written is
 /// no reason to lose a result.
 pub fn put(text: &str) {
-    let _ = stderr().write_all(text.as_bytes());
+    let _ = io::stderr().write_all(text.as_bytes());
 }
 
 /// Whether a path stands for standard input or output.

@@ -157,7 +157,7 @@ macro_rules! calls {
         pub unsafe extern "C" fn $flush(bank: *mut Stream, to: *mut $sample) -> isize {
             let run = || {
                 let stream = stream(bank)?;
-                stream.flush(output(to, tail(stream))?).map_err(|error| error.to_string())
+                stream.flush(&mut output(to, tail(stream))?).map_err(|error| error.to_string())
             };
             count(run())
         }

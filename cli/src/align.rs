@@ -6,7 +6,6 @@ use super::calibrate_report::{Interval, interval, periods, shown};
 use super::capture_args::{CaptureArgs, check_stdin};
 use super::capture_file::{start, unread};
 use super::file_kind::FileKind;
-use super::interrupt::interrupts;
 use super::print::{Failure, check_json, failed, failed_at, is_dash, say_understood, show, warn};
 use super::written::{Mono, begin_file, begin_recording, check_outputs, write_text, write_together};
 use hybank::calibrate::{CalibrateError, Record};
@@ -143,7 +142,7 @@ impl Args {
         let options = ReadOptions { full_scale: own.full_scale.or(spec.full_scale), ..own };
         let (mut records, mut formats, mut headers) = (Vec::new(), Vec::new(), Vec::new());
         for path in &self.captures {
-            let mut reader = start(std::slice::from_ref(path), options, interrupts())?;
+            let mut reader = start(std::slice::from_ref(path), options)?;
             self.reading.scale.check(&reader)?;
             check_rate(spec, &reader).map_err(failed)?;
             let Some(header) = reader.headers().next().map(|(_, header)| *header) else { continue };

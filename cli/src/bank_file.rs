@@ -5,9 +5,7 @@ use super::print::{Failure, InFile, failed, failed_at, is_dash, name, say_line};
 use hybank::analog::fit::Measurements;
 use hybank::bank::Bank;
 use hybank::design::filters;
-use hybank::files::{self, FileError, SPEC_OR_BANK, StandardStream};
-use hybank::memory::check_memory;
-use hybank::runtime::{Options, Plan};
+use hybank::files::{self, SPEC_OR_BANK};
 use hybank::spec::{DesignOverrides, Spec, SpecError, SpecProblem, with_measurements_renamed};
 use std::path::{Path, PathBuf};
 
@@ -17,17 +15,6 @@ pub(super) fn load(path: &Path) -> Result<Bank, Failure> {
     let bank = Bank::from_json(&text, &name(path)).map_err(failed)?;
     filters::check_stable(&bank).in_file(path)?;
     Ok(bank)
-}
-
-/// Compiles the bank of the file `path`, if the process may use as much memory as that and so many streams
-/// take.
-pub(super) fn plan(bank: &Bank, options: Options, streams: usize, path: &Path) -> Result<Plan, Failure> {
-    let bytes = bank.plan_bytes(options, streams).in_file(path)?;
-    check_memory(bytes).map_err(|shortage| {
-        let remedy = "use shorter filters, or --algorithm direct";
-        failed_at(path, format!("to filter with it takes {shortage}; {remedy}"))
-    })?;
-    bank.plan(options).in_file(path)
 }
 
 /// A spec, and the measurements that it names.
@@ -108,8 +95,6 @@ pub(super) fn load_spec_or_bank(path: &Path) -> Result<SpecFile, Failure> {
 /// The bytes of a file; `-` is standard input.
 fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
     let bytes = if is_dash(path) {
-        let check = StandardStream::Input.check();
-        check.map_err(FileError::system(&name(path), "read it")).map_err(failed)?;
         files::bytes_of(std::io::stdin().lock(), &name(path), SPEC_OR_BANK)
     } else {
         files::read_bytes(path, SPEC_OR_BANK)

@@ -3,7 +3,7 @@
 use super::before_after;
 use super::output::begin_samples;
 use super::print::{Failure, check_strict, failed, name, print, print_report, stopped, warn};
-use super::run::{Job, each_block, interrupted};
+use super::run::{Job, each_block};
 use hybank::bank::Bank;
 use hybank::files::commit_all;
 use hybank::interchange::{BitTrue, WordSizes};
@@ -68,11 +68,8 @@ impl BitTrueArgs {
         let output = begin_samples(job.output, header, job.args.force).map_err(stopped)?;
         let skip = if job.dropped == DroppedLatency::All { job.bank.output_delay() } else { 0 };
         let mut run = Run::new(model, output, format, skip, job.bank);
-        let is_stopped = each_block(reader, |recordings| run.process(recordings))?;
+        each_block(reader, |recordings| run.process(recordings))?;
         let frames = reader.consumed();
-        if is_stopped {
-            return Err(interrupted(frames));
-        }
         run.flush()?;
         let mut report = Report {
             samples: run.samples,
@@ -162,7 +159,7 @@ impl Run {
     fn process(&mut self, recordings: &[PcmFrames<'_>]) -> Result<(), Failure> {
         let channels = recordings.channels();
         let mut numbers = vec![0.0f64; recordings.frames() * channels];
-        recordings.load(Isa::detect(), 0, &mut numbers);
+        recordings.load_f64(Isa::detect(), 0, &mut numbers);
         // A power of two: the product is the integer itself.
         let frames: Vec<i32> = numbers.iter().map(|x| (x * self.full_scale()) as i32).collect();
         let fast = self.filtered(&frames, channels);

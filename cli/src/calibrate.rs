@@ -5,7 +5,6 @@ use super::calibrate_report::Report;
 use super::capture_args::{CaptureArgs, InterleavedArgs, check_stdin};
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, start, unread};
 use super::file_kind::FileKind;
-use super::interrupt::interrupts;
 use super::measure::{ToneArg, tone, tones};
 use super::print::{Failure, check_json, explained, failed, say_understood, warn};
 use super::written::{check_output, write_text};
@@ -213,7 +212,7 @@ impl Args {
         if !first.is_file() {
             return Ok(paths.len());
         }
-        let reader = start(std::slice::from_ref(first), self.reading.format().options(2, 1), interrupts())?;
+        let reader = start(std::slice::from_ref(first), self.reading.format().options(2, 1))?;
         let files = spec.channels.len() / reader.channels().max(1);
         Ok(if files > 0 && paths.len().is_multiple_of(files) { files } else { paths.len() })
     }
@@ -229,7 +228,7 @@ impl Args {
         let converters = Converters::from(spec);
         let interleaving = self.interleaved.interleaving(&converters, &self.spec)?;
         let options = converters.options(self.reading.format(), paths.len(), interleaving.as_ref());
-        let mut reader = start(paths, options, interrupts())?;
+        let mut reader = start(paths, options)?;
         self.reading.scale.check(&reader)?;
         check_channels(converters.layout(), "the spec", &reader).map_err(failed)?;
         check_rate(spec, &reader).map_err(failed)?;

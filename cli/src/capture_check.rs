@@ -59,9 +59,9 @@ impl CaptureCheck {
     pub(super) fn observe(&mut self, recordings: &[PcmFrames<'_>]) {
         let State::Collecting { samples, .. } = &mut self.state else { return };
         let known = samples.first().map_or(0, Vec::len);
-        let block = Frames::new(recordings, 0..self.frames - known);
+        let block = Frames::new(&recordings, 0..self.frames - known);
         let mut numbers = vec![0.0; block.frames() * block.channels()];
-        block.load(Isa::detect(), 0, &mut numbers);
+        block.load_f64(Isa::detect(), 0, &mut numbers);
         for (i, samples) in samples.iter_mut().enumerate() {
             samples.extend(numbers.iter().skip(i).step_by(block.channels()));
         }
@@ -82,7 +82,7 @@ impl CaptureCheck {
         let judge = move || {
             let found = judged(&spec, samples);
             if let Some(events) = events {
-                found.warnings.iter().for_each(|text| events.report(Event::Warning { text: text.clone() }));
+                found.warnings.iter().for_each(|text| events.tell(&Event::Warning { text: text.clone() }));
             }
             found
         };

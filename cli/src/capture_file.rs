@@ -3,9 +3,8 @@
 use super::capture_args::check_scale;
 use super::file_kind::unreadable;
 use super::print::{Failure, failed, failed_at, is_dash, name, warn};
-use crossbeam_channel::Receiver;
 use hybank::captures::{CaptureError, Captures, ChannelSamples};
-use hybank::io::{MultiReader, OfflineError, ReadOptions, check_real};
+use hybank::io::{MultiReader, ReadOptions, check_real};
 use hybank::messages::Quoted;
 use hybank::units::Hertz;
 use std::path::{Path, PathBuf};
@@ -44,7 +43,7 @@ impl Reading {
 impl CaptureFile {
     /// Reads a recording; `-` is standard input.
     pub(super) fn read(path: &Path, reading: Reading) -> Result<Self, Failure> {
-        let mut reader = start(&[path.to_owned()], reading.options, crossbeam_channel::never())?;
+        let mut reader = start(&[path.to_owned()], reading.options)?;
         check_scale(reading.options.full_scale, &reader)?;
         Captures::check_mono(&reader).map_err(unread)?;
         if !reading.takes_complex {
@@ -85,27 +84,18 @@ impl CaptureFile {
 }
 
 /// A reader of the headers of all inputs.
-pub(super) fn start(
-    inputs: &[PathBuf],
-    options: ReadOptions<'_>,
-    stop: Receiver<()>,
-) -> Result<MultiReader, Failure> {
-    MultiReader::start(inputs, options, stop).map_err(unreadable)?.ok_or_else(interrupted)
+pub(super) fn start(inputs: &[PathBuf], options: ReadOptions<'_>) -> Result<MultiReader, Failure> {
+    MultiReader::start(inputs, options).map_err(unreadable)
 }
 
 /// Why samples could not be read.
 pub(super) fn unread(error: CaptureError) -> Failure {
     match error {
-        CaptureError::Samples(OfflineError::Stopped) => interrupted(),
         CaptureError::NotMono { channels, .. } => {
             Failure::Input(format!("{error}: --channel 1 to {channels}"))
         }
         error => failed(error),
     }
-}
-
-fn interrupted() -> Failure {
-    failed("interrupted; nothing was written")
 }
 
 /// Refuses what cannot be read twice.

@@ -3,14 +3,14 @@
 use super::bank_file::{bad_flag, load_spec};
 use super::design_report::{Judged, Report};
 use super::design_studies::BandHint;
-use super::interrupt::{end_at_interrupt, end_with};
+use super::interrupt::interrupts;
 use super::print::{
-    Failure, InFile, check_json, check_strict, failed, failed_at, is_dash, say, say_line, say_understood,
-    show, warn,
+    Failure, InFile, PROGRAM, check_json, check_strict, failed, failed_at, is_dash, say, say_line,
+    say_understood, show, warn,
 };
 use super::written::{check_output, write_text};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
-use hybank::design::{self, DesignError, Effort, Limits, Options, Stage};
+use hybank::design::{self, Design, DesignError, Options, Stage, Stop, TIME_LIMIT};
 use hybank::messages::Quoted;
 use hybank::spec::{DesignOverrides, Method, Spec, WordLengths};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -38,7 +38,6 @@ Examples:
   hybank design spec.toml -o bank.json --method h2 --snr 90
   hybank design spec.toml -o fixed.json --taps 64 --bits 14
   hybank design spec.toml -o fixed.json --loss-db 0.1
-  hybank design spec.toml -o digits.json --loss-db 0.1 --digits
   hybank design spec.toml -o small.json --method iir --order 6
   hybank design spec.toml -o small.json --method iir --reduction-loss-db 0.5
   hybank design spec.toml -o - --taps 64 | hybank analyze -")]
@@ -74,9 +73,6 @@ pub(super) struct Args {
     /// lose at most this many decibels of SNR relative to the real taps
     #[arg(long, value_name = "DB", conflicts_with = "fraction_bits")]
     loss_db: Option<f64>,
-    /// With --loss-db: taps of the fewest canonical signed digits, for multiplication by shifts and adders
-    #[arg(long, requires = "loss_db")]
-    digits: bool,
     /// Use at most this many states (methods iir and h2)
     #[arg(long)]
     order: Option<usize>,
@@ -84,7 +80,8 @@ pub(super) struct Args {
     /// iir and h2)
     #[arg(long, value_name = "DB", conflicts_with = "order")]
     reduction_loss_db: Option<f64>,
-    /// Design even if the estimate exceeds ten minutes or the memory of the machine
+    /// Design for longer than ten minutes. By default a design ends then, as at the first Ctrl-C, with the
+    /// best bank so far
     #[arg(long)]
     no_limit: bool,
     /// Make every warning about the spec and the bank an error
@@ -112,7 +109,6 @@ fn overrides(args: &Args) -> DesignOverrides {
         bits: args.bits.clone(),
         fraction_bits: args.fraction_bits,
         loss_db: args.loss_db,
-        digits: args.digits,
         order: args.order,
         reduction_loss_db: args.reduction_loss_db,
         noise: None,
@@ -129,22 +125,20 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     say_understood(Some(&spec));
     warn_or_refuse(&spec_warnings(&spec, &args.spec), args.strict)?;
     let begin = Instant::now();
-    end_at_interrupt();
-    let progress = Progress::default();
-    let limits = if args.no_limit { Limits::Off } else { Limits::Enforced };
-    let options =
-        Options { limits, observer: &|stage, effort| progress.note(stage, effort), ..Options::default() };
-    let give_up = || give_up(&args.spec, &spec);
-    let limit = limits.time().map(|limit| limit + PATIENCE);
-    let found = progress.during(limit, give_up, || design::design(&spec, &options)).in_file(&args.spec)?;
+    let found = designed(args, &spec)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
     let mut judged = Judged::new(&found.bank).in_file(&args.spec)?;
     if !args.force {
         judged.check_useful(&found.bank).in_file(&args.spec)?;
     }
-    warn_or_refuse(&judged.warnings(&found.bank), args.strict)?;
+    let is_ended = found.proof == Err(DesignError::Stopped);
+    let ended = is_ended.then(|| format!("{}: {}", Quoted(&args.spec), DesignError::Stopped));
+    let warnings: Vec<String> = judged.warnings(&found.bank).into_iter().chain(ended).collect();
+    warn_or_refuse(&warnings, args.strict)?;
     write_text(&args.output, &found.bank.to_json().map_err(failed)?, args.force)?;
-    judged.hint = BandHint::new(&found, seconds).in_file(&args.spec)?;
+    if !is_ended {
+        judged.hint = BandHint::new(&found, seconds).in_file(&args.spec)?;
+    }
     let report = Report::new(args.output.display().to_string(), &found, judged, seconds);
     if is_dash(&args.output) {
         say(&report.text(args.verbose));
@@ -153,11 +147,26 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     show(&report, args.json, |report| report.text(args.verbose))
 }
 
+/// The design of a spec. Its time limit and the first interrupt end it with what it has.
+fn designed(args: &Args, spec: &Spec) -> Result<Design, Failure> {
+    let time_limit = (!args.no_limit).then_some(TIME_LIMIT);
+    let watch = Watch {
+        stop: Stop::default(),
+        interrupts: interrupts(),
+        limit: time_limit.map(|limit| limit + PATIENCE),
+        give_up: &|| give_up(&args.spec, spec),
+        stage: Mutex::default(),
+    };
+    let observer = |stage| watch.note(stage);
+    let stop = watch.stop.clone();
+    let options = Options { time_limit, observer: &observer, stop, ..Options::default() };
+    watch.during(|| design::design(spec, &options)).in_file(&args.spec)
+}
+
 /// Ends a design that its time limit cannot end, because one step of it takes too long.
 fn give_up(path: &Path, spec: &Spec) {
     let error = DesignError::StoppedWithoutBank { remedy: design::remedy(spec) };
-    let Failure::Input(message) = failed_at(path, error) else { return };
-    end_with(&message);
+    std::process::exit(i32::from(PROGRAM.fail(failed_at(path, error))));
 }
 
 /// What in the spec is probably not meant. A spec that is wrong is refused by the design.
@@ -175,91 +184,73 @@ fn warn_or_refuse(warnings: &[String], strict: bool) -> Result<(), Failure> {
 
 /// Shorter designs say nothing on a terminal.
 const SILENCE: Duration = Duration::from_secs(1);
-/// Time between two updates of the display on a terminal.
-const REDRAW_INTERVAL: Duration = Duration::from_millis(125);
+/// Time between two looks at a design that runs.
+const LOOK: Duration = Duration::from_millis(125);
 /// Time between two lines where stderr is no terminal.
 const LINE: Duration = Duration::from_secs(30);
 
-/// What a design does now, and the estimate of all of it.
-#[derive(Default)]
-struct Progress {
-    now: Mutex<Option<(Stage, Effort)>>,
+/// Follows a design: shows what it does, ends it at an interrupt, and gives it up long after its limit.
+struct Watch<'a> {
+    stop: Stop,
+    interrupts: Receiver<()>,
+    limit: Option<Duration>,
+    give_up: &'a (dyn Fn() + Sync),
+    /// What the design does now.
+    stage: Mutex<Option<Stage>>,
 }
 
-impl Progress {
+impl Watch<'_> {
     /// The step that begins.
-    fn note(&self, stage: Stage, effort: Effort) {
-        *self.now.lock().unwrap_or_else(PoisonError::into_inner) = Some((stage, effort));
+    fn note(&self, stage: Stage) {
+        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = Some(stage);
     }
 
-    /// Runs `work` and shows meanwhile what it does; calls `give_up` if it has not ended by the `limit`.
-    /// Without threads for that, nothing is shown and nothing limited.
-    fn during<T>(
-        &self,
-        limit: Option<Duration>,
-        give_up: impl FnOnce() + Send,
-        work: impl FnOnce() -> T,
-    ) -> T {
+    /// Runs `work` and follows it meanwhile. Without a thread for that, nothing is shown and nothing limited.
+    fn during<T>(&self, work: impl FnOnce() -> T) -> T {
         thread::scope(|scope| {
             let (done_sender, done): (Sender<()>, _) = bounded(0);
-            let end = done.clone();
-            let overdue = move || {
-                if limit.is_some_and(|limit| wait(&end, limit)) {
-                    give_up()
-                }
-            };
             // A thread that cannot be started is no reason to fail.
-            let begin = |name: &str| thread::Builder::new().name(name.into());
-            let display = begin("progress").spawn_scoped(scope, move || self.report(&done));
-            let limiter = begin("limit").spawn_scoped(scope, overdue);
+            let follower = thread::Builder::new().name("progress".into());
+            let follower = follower.spawn_scoped(scope, move || self.follow(&done));
             let result = work();
-            drop((done_sender, display, limiter));
+            drop((done_sender, follower));
             result
         })
     }
 
-    fn report(&self, done: &Receiver<()>) {
-        let begin = Instant::now();
-        if std::io::stderr().is_terminal() {
-            self.draw(begin, done);
-        } else {
-            while wait(done, LINE) {
-                self.text(begin).iter().for_each(|line| say_line(line));
-            }
-        }
-    }
-
-    fn draw(&self, begin: Instant, done: &Receiver<()>) {
-        if !wait(done, SILENCE) {
-            return;
-        }
+    fn follow(&self, done: &Receiver<()>) {
+        let (begin, is_terminal) = (Instant::now(), std::io::stderr().is_terminal());
+        let mut due = if is_terminal { SILENCE } else { LINE };
         let bar = ProgressBar::new_spinner();
         let bar = ProgressStyle::with_template("{spinner} {msg}")
             .map_or(bar.clone(), |style| bar.with_style(style));
-        while wait(done, REDRAW_INTERVAL) {
-            bar.set_message(self.text(begin).unwrap_or_default());
-            bar.tick();
+        while done.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+            let elapsed = begin.elapsed();
+            if self.interrupts.try_recv().is_ok() {
+                bar.suspend(|| say_line("interrupted: the design ends with the best bank so far"));
+                self.stop.now();
+            }
+            if self.limit.is_some_and(|limit| elapsed > limit) {
+                (self.give_up)();
+            }
+            match self.text(elapsed).filter(|_| elapsed >= due) {
+                Some(line) if is_terminal => {
+                    bar.set_message(line);
+                    bar.tick();
+                }
+                Some(line) => {
+                    say_line(&line);
+                    due += LINE;
+                }
+                None => {}
+            }
         }
         bar.finish_and_clear();
     }
 
-    fn text(&self, begin: Instant) -> Option<String> {
-        let (stage, effort) = (*self.now.lock().unwrap_or_else(PoisonError::into_inner))?;
-        Some(line(stage, begin.elapsed(), effort))
-    }
-}
-
-/// Whether the time is over; false if the work is done.
-fn wait(done: &Receiver<()>, time: Duration) -> bool {
-    done.recv_timeout(time) == Err(RecvTimeoutError::Timeout)
-}
-
-fn line(stage: Stage, elapsed: Duration, effort: Effort) -> String {
-    let seconds = elapsed.as_secs();
-    if effort.longest > elapsed.as_secs_f64() {
-        format!("{stage}: {seconds} s of about {}", effort.time())
-    } else {
-        format!("{stage}: {seconds} s, more than expected")
+    fn text(&self, elapsed: Duration) -> Option<String> {
+        let stage = (*self.stage.lock().unwrap_or_else(PoisonError::into_inner))?;
+        Some(format!("{stage}: {} s", elapsed.as_secs()))
     }
 }
 
@@ -267,29 +258,50 @@ fn line(stage: Stage, elapsed: Duration, effort: Effort) -> String {
 mod tests {
     use super::*;
 
+    fn watch<'a>(limit: Option<Duration>, give_up: &'a (dyn Fn() + Sync)) -> Watch<'a> {
+        Watch {
+            stop: Stop::default(),
+            interrupts: crossbeam_channel::never(),
+            limit,
+            give_up,
+            stage: Mutex::default(),
+        }
+    }
+
     #[test]
-    fn the_line_says_the_step_and_the_time_that_is_expected() {
-        let said = |shortest, longest| {
-            let effort = Effort { shortest, longest, bytes: 1e6 };
-            line(Stage::Latency { designs: 7 }, Duration::from_secs(31), effort)
-        };
-        let step = "choosing the latency (7 designs compared): 31 s";
-        assert_eq!(said(119.0, 120.4), format!("{step} of about 2.0 minutes"));
-        assert_eq!(said(0.08, 120.4), format!("{step} of about 80 ms to 2.0 minutes"));
-        assert_eq!(said(15.0, 20.0), format!("{step}, more than expected"));
+    fn the_line_says_the_step_and_its_time_so_far() {
+        let watch = watch(None, &|| ());
+        assert_eq!(watch.text(Duration::from_secs(31)), None);
+        watch.note(Stage::Latency { designs: 7 });
+        let line = watch.text(Duration::from_secs(31)).unwrap();
+        assert_eq!(line, "choosing the latency (7 designs compared): 31 s");
     }
 
     #[test]
     fn the_result_of_the_work_comes_back() {
-        assert_eq!(Progress::default().during(None, || (), || 7), 7);
+        assert_eq!(watch(None, &|| ()).during(|| 7), 7);
     }
 
     #[test]
     fn work_that_does_not_end_in_time_is_given_up() {
         let (given_up, done) = bounded(1);
-        let waited = || done.recv_timeout(Duration::from_secs(60));
-        let waited = Progress::default().during(Some(Duration::ZERO), || given_up.send(()).unwrap(), waited);
+        let give_up = || _ = given_up.try_send(());
+        let waited = watch(Some(Duration::ZERO), &give_up).during(|| done.recv_timeout(PATIENCE));
         assert_eq!(waited, Ok(()));
-        Progress::default().during(Some(Duration::from_secs(60)), || panic!("in time"), || ());
+        watch(Some(PATIENCE), &|| panic!("in time")).during(|| ());
+    }
+
+    #[test]
+    fn an_interrupt_stops_the_design() {
+        let (interrupt, interrupts) = bounded(1);
+        let watch = Watch { interrupts, ..watch(None, &|| ()) };
+        let begin = Instant::now();
+        watch.during(|| {
+            interrupt.send(()).unwrap();
+            while !watch.stop.is_due() && begin.elapsed() < PATIENCE {
+                thread::yield_now();
+            }
+        });
+        assert!(watch.stop.is_due());
     }
 }

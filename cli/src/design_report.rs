@@ -3,7 +3,7 @@
 use super::design_studies::{BandHint, Words, known, number, order_text, robust_text};
 use hybank::bank::{Bank, Gamma, SynthesisFilters};
 use hybank::design::{
-    Design, DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, Unfinished, analyze_mean,
+    Design, DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, analyze_mean,
 };
 use hybank::figures::Figures;
 use hybank::messages::{Quoted, counted};
@@ -13,9 +13,6 @@ use hybank::overview::{
 use hybank::spec::Method;
 use hybank::units::Hertz;
 use hybank::verify::Verified;
-
-/// Width of the interval of the least gamma, over gamma, of a design that was far from its end: 0.09 dB.
-const FAR_FROM_FINISHED: f64 = 0.01;
 
 /// The report; serialised it is that of `--json`.
 #[derive(Debug, serde::Serialize)]
@@ -46,9 +43,6 @@ pub(super) struct Report<'a> {
     peak_hertz: Hertz,
     #[serde(skip)]
     is_normalised: bool,
-    /// What the search for the least gamma left open.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    unfinished: Option<Unfinished>,
     iterations: usize,
     seconds: f64,
     #[serde(flatten)]
@@ -158,7 +152,6 @@ impl<'a> Report<'a> {
             judged,
             peak_hertz: design.peak_frequency.in_hertz(bank.slow_period()),
             is_normalised: bank.is_normalised(),
-            unfinished: design.unfinished,
             iterations: design.iterations,
             seconds,
             proof: ProofReport::of(design),
@@ -169,14 +162,12 @@ impl<'a> Report<'a> {
     pub(super) fn text(&self, verbose: bool) -> String {
         let terms = [self.heading(), figure_text(&self.judged.figures, self.is_normalised)].concat();
         if !verbose {
-            let unfinished = if self.is_far_from_finished() { self.unfinished_text() } else { String::new() };
-            return terms + &self.gamma_line() + &self.choice() + &unfinished + &self.hint();
+            return terms + &self.gamma_line() + &self.choice() + &self.hint();
         }
         let parts = [
             format!("{}\n", self.understood),
             terms,
             self.gamma_text(),
-            self.unfinished_text(),
             self.mean_text(),
             self.hint(),
             self.choice(),
@@ -207,18 +198,9 @@ impl Report<'_> {
         )
     }
 
-    /// Whether the least gamma may be lower by an amount that decides anything.
-    fn is_far_from_finished(&self) -> bool {
-        self.unfinished.is_some_and(|left| left.width > FAR_FROM_FINISHED)
-    }
-
     /// How integer taps were chosen for a loss.
     fn choice(&self) -> String {
         self.words.as_ref().map(Words::choice_text).unwrap_or_default()
-    }
-
-    fn unfinished_text(&self) -> String {
-        self.unfinished.map_or_else(String::new, |left| format!("unfinished {left}\n"))
     }
 
     fn hint(&self) -> String {
@@ -237,9 +219,20 @@ impl Report<'_> {
             None => ("the input", String::new()),
         };
         format!(
-            "gamma      {} (worst-case gain from {input} to the error; {proof}{any})\n",
-            known(self.gamma.norm)
+            "gamma      {} (worst-case gain from {input} to the error; {proof}{}{any})\n",
+            known(self.gamma.norm),
+            self.above_lower()
         )
+    }
+
+    /// How far gamma is above the computed lower bound.
+    fn above_lower(&self) -> String {
+        match (self.gamma.norm, self.gamma.lower) {
+            (Some(norm), Some(lower)) if lower > 0.0 => {
+                format!("; gamma / lower: {}", six_digits(norm / lower))
+            }
+            _ => String::new(),
+        }
     }
 
     fn size(&self) -> String {
@@ -258,13 +251,14 @@ impl Report<'_> {
         let Gamma { norm, lower, noncausal, .. } = *self.gamma;
         format!(
             "gamma      {} (computed norm of this bank; worst at {} modulo the slow rate)\n\
-             {}lower      {} ({})\n\
+             {}lower      {} ({}{})\n\
              noncausal  {} ({})\n",
             known(norm),
             frequency(self.peak_hertz, self.is_normalised),
             self.scale_text(),
             known(lower),
             self.lower_meaning(),
+            self.above_lower(),
             known(noncausal),
             if noncausal.is_none() { UNRESOLVED } else { "computed lower bound for any latency" },
         )

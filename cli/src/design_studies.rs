@@ -34,22 +34,16 @@ impl<'a> Words<'a> {
         let fewest = self.study.words.iter().position(|word| word.mean_square_loss_db <= choice.allowed_db);
         let fewest = fewest.unwrap_or_default();
         let fewer = fewest.checked_sub(1).map(|fewer| &self.study.words[fewer]);
-        let why = match (choice.by_digits, fewer) {
-            (true, _) => format!(
-                "taps of the fewest bits, {}, have {}",
-                self.study.words[fewest].bits,
-                counted(choice.signed_digits_of_fewest_bits as usize, "signed digit")
-            ),
-            (false, Some(word)) => format!("{} lose {:.3} dB", word.bits, word.mean_square_loss_db),
-            (false, None) => "no tap has fewer bits".to_owned(),
+        let why = match fewer {
+            Some(word) => format!("{} lose {:.3} dB", word.bits, word.mean_square_loss_db),
+            None => "no tap has fewer bits".to_owned(),
         };
         format!(
-            "words      {} times 2^{}, {} left out, {}\n\
+            "words      {} times 2^{}, {} left out\n\
              \x20          {:.3} dB of the SNR of the real taps lost, {} allowed, over the whole spectrum of the signal; {why}\n",
             self.bits,
             -self.fraction_bits,
             counted(choice.taps_left_out, "tap"),
-            counted(choice.signed_digits as usize, "signed digit"),
             choice.snr_loss_db,
             choice.allowed_db,
         )
@@ -118,7 +112,7 @@ const TABLE_ROWS: usize = 32;
 
 /// Full and reduced order, and the error for each number of states.
 pub(super) fn order_text(reduction: &OrderReduction, method: Method) -> String {
-    let OrderReduction { full, reduced, orders, unrefined } = reduction;
+    let OrderReduction { full, reduced, orders } = reduction;
     let lost = if method == Method::H2 { "of H2 error" } else { "of gamma" };
     let mut text = format!(
         "order      {} of {} states: gamma {} instead of {}, {:.4} dB {lost} lost\n",
@@ -136,9 +130,6 @@ pub(super) fn order_text(reduction: &OrderReduction, method: Method) -> String {
     if orders.len() <= TABLE_ROWS {
         text += &format!("{:>10} {:>14} {:>14} {:>13}\n", "states", "gamma", "H2 error", "loss");
         text.extend(orders.iter().map(row));
-    }
-    if let Some(failure) = unrefined {
-        text += &format!("{:>10} not all poles were refined: {failure}\n", "");
     }
     text
 }

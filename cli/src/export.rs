@@ -6,9 +6,7 @@ use super::written::{begin_file, check_output, check_outputs, write_bytes, write
 use clap::ValueEnum;
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::analyze;
-use hybank::interchange::{
-    Circuit, Format, Multipliers, Verilog, VerilogOptions, block_of_sections, export, sections,
-};
+use hybank::interchange::{Circuit, Format, Verilog, VerilogOptions, block_of_sections, export, sections};
 use hybank::messages::Quoted;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
@@ -33,7 +31,6 @@ Examples:
   hybank export fixed.json -o bank.h --input-bits 12
   hybank export fixed.json -o core.v --input-bits 12 --output-bits 14 --testbench test
   hybank export fixed.json -o core.v --input-bits 12 --clocks-per-frame 8 --pipeline 2
-  hybank export fixed.json -o core.v --input-bits 12 --multipliers shift-add --json
   hybank export recursive.json --format sos -o sections.csv")]
 pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
@@ -96,9 +93,6 @@ struct VerilogArgs {
     /// Levels of adders between two registers [default: 1]
     #[arg(long, value_name = "LEVELS")]
     pipeline: Option<NonZeroU32>,
-    /// How constants multiply [default: inferred]
-    #[arg(long, value_enum)]
-    multipliers: Option<Multipliers>,
     /// Write a self-checking testbench into this folder too, with its frames and the outputs of the
     /// bit-true model
     #[arg(long, value_name = "DIR")]
@@ -111,8 +105,7 @@ struct VerilogArgs {
 impl VerilogArgs {
     fn is_given(&self) -> bool {
         let numbers = [self.output_bits, self.accumulator, self.random_frames].iter().any(Option::is_some);
-        let circuit =
-            self.clocks_per_frame.is_some() || self.pipeline.is_some() || self.multipliers.is_some();
+        let circuit = self.clocks_per_frame.is_some() || self.pipeline.is_some();
         numbers || circuit || self.testbench.is_some()
     }
 
@@ -124,7 +117,6 @@ impl VerilogArgs {
             accumulator_bits: self.accumulator,
             clocks_per_frame: self.clocks_per_frame.unwrap_or(plain.clocks_per_frame),
             pipeline: self.pipeline.unwrap_or(plain.pipeline),
-            multipliers: self.multipliers.unwrap_or(plain.multipliers),
         }
     }
 }
@@ -145,7 +137,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let format = args.chosen_format()?;
     if format != Format::Verilog && args.verilog.is_given() {
         let message = "these options describe a circuit; give --format verilog, or leave out --output-bits, --accumulator, \
-             --clocks-per-frame, --pipeline, --multipliers and --testbench";
+             --clocks-per-frame, --pipeline and --testbench";
         return Err(Failure::Usage(message.to_owned()));
     }
     check_json(args.json, &args.output, "code")?;

@@ -89,7 +89,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
     let bank = bank_file::load(&args.bank)?;
     say_understood(bank.spec.as_ref());
-    let mut observer = args.run.observer.begin(args.run.force)?;
+    let mut observer = args.run.observer.begin(&bank, args.run.force, false)?;
     let job = args.job(&bank);
     args.fuse(&job, &mut observer).inspect_err(|failure| observer.fail(failure))
 }
@@ -147,7 +147,7 @@ impl Args {
         }
         let rate = job.output_rate(&reader)?;
         let progress = progress_bar(reader.promised_frames());
-        let plan = job.plan(reader.is_complex())?;
+        let plan = job.plan()?;
         let finished = job.run(&plan, &mut reader, observer, &|frames| progress.inc(frames))?;
         progress.finish_and_clear();
         let seconds = begin.elapsed().as_secs_f64();

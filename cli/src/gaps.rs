@@ -4,7 +4,7 @@ use super::print::say_line;
 use super::print::{Failure, failed};
 use super::written::begin_beside;
 use hybank::files::AtomicFile;
-use hybank::io::{LiveLost, LostSamples, MAX_LOST, ReadOptions, Until, is_pipe};
+use hybank::io::{LostSamples, MAX_LOST, ReadOptions, Until};
 use hybank::pipeline::{GapPolicy, GapSummary};
 use std::path::{Path, PathBuf};
 
@@ -25,8 +25,7 @@ pub(super) struct GapArgs {
     /// File of JSON lines that name lost samples. {"channel": 1, "sample_start": 5, "global_index": 8}:
     /// sample 5 of the input was number 8 at the converter; the first such line of a channel is about its
     /// sample 0. {"channel": 2, "first": 40, "length": 3}:
-    /// samples 40 to 42 are invalid. From a FIFO `stream` takes lines as they come, each before its samples,
-    /// and waits for none
+    /// samples 40 to 42 are invalid
     #[arg(long, value_name = "FILE")]
     lost: Option<PathBuf>,
     /// The most frames (one sample of each channel of an input) that an input may leave out in all; more are
@@ -79,16 +78,9 @@ impl GapArgs {
         given.into_iter().find_map(|(option, is_given)| is_given.then_some(option))
     }
 
-    /// Reads the file of lost samples, if one is given; in a `live` run it begins to read a FIFO and waits
-    /// for nothing.
-    pub(super) fn lost_samples(&self, live: bool) -> Result<Lost, Failure> {
-        match self.lost() {
-            None => Ok(Lost { read: None, live: None }),
-            Some(path) if live && is_pipe(path) => {
-                Ok(Lost { read: None, live: Some(LiveLost::begin(path).map_err(failed)?) })
-            }
-            Some(path) => Ok(Lost { read: Some(LostSamples::read(path).map_err(failed)?), live: None }),
-        }
+    /// Reads the file of lost samples, if one is given.
+    pub(super) fn lost_samples(&self) -> Result<Option<LostSamples>, Failure> {
+        self.lost().map(LostSamples::read).transpose().map_err(failed)
     }
 
     /// The file of lost samples.
@@ -102,10 +94,13 @@ impl GapArgs {
     }
 
     /// The options of reading that concern gaps; the others are those of `options`.
-    pub(super) fn read_options<'a>(&self, lost: &'a Lost, options: ReadOptions<'a>) -> ReadOptions<'a> {
+    pub(super) fn read_options<'a>(
+        &self,
+        lost: Option<&'a LostSamples>,
+        options: ReadOptions<'a>,
+    ) -> ReadOptions<'a> {
         let until = if self.longest { Until::Longest } else { Until::Shortest };
-        let (lost, live_lost) = (lost.read.as_ref(), lost.live.as_ref());
-        ReadOptions { lost, live_lost, until, max_lost: self.max_lost.unwrap_or(MAX_LOST), ..options }
+        ReadOptions { lost, until, max_lost: self.max_lost.unwrap_or(MAX_LOST), ..options }
     }
 
     /// The replacement of a missing sample, if gaps are to be filled.
@@ -120,13 +115,6 @@ impl GapArgs {
     pub(super) fn begin_mask(&self, force: bool) -> Result<Option<AtomicFile>, Failure> {
         self.mask().map(|path| begin_beside(path, force)).transpose()
     }
-}
-
-/// What `--lost` says: now, or during the run.
-#[derive(Debug)]
-pub(super) struct Lost {
-    read: Option<LostSamples>,
-    live: Option<LiveLost>,
 }
 
 /// Reports the gaps on standard error; only how many, if they were said during the run.

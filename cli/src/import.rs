@@ -7,7 +7,6 @@ use super::written::{check_output, write_text};
 use hybank::design::{self, ProofSearch};
 use hybank::files::{Bound, read_bytes};
 use hybank::interchange::{TapsError, taps_of_csv, taps_of_npy};
-use hybank::memory::check_memory;
 use hybank::messages::Quoted;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -67,10 +66,6 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     show(&report, args.json, |report| report.text(args.verbose))
 }
 
-/// Bytes of memory for a byte of a file of taps: two of a table may be a tap, which the bank file writes as
-/// text.
-const TAP_BYTES: f64 = 30.0;
-
 /// Reads taps from the bytes of a file.
 type Parse = fn(&[u8]) -> Result<Vec<Vec<f64>>, TapsError>;
 
@@ -86,7 +81,5 @@ fn read(path: &Path) -> Result<Vec<Vec<f64>>, Failure> {
         }
     };
     let bytes = read_bytes(path, TAPS_FILE).map_err(failed)?;
-    let shortage = check_memory(TAP_BYTES * bytes.len() as f64);
-    shortage.map_err(|shortage| failed_at(path, format!("to read its taps takes {shortage}")))?;
     parse(&bytes).in_file(path)
 }

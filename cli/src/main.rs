@@ -40,21 +40,10 @@ mod virtual_signal;
 mod written;
 
 use clap::{Parser, Subcommand};
-use hybank::memory::check_memory;
 use hybank::messages::arguments;
+use hybank::program::interrupts;
 use print::{Failure, PROGRAM};
 use std::process::ExitCode;
-
-// Before `main`: the standard library then opens /dev/null in the place of a closed stream, and what a
-// parent opened there by itself (Python's `subprocess.DEVNULL`, daemons) has the same flags, position and
-// inode, so nothing tells the two apart later. The macro allows itself the unsafe code that this takes.
-ctor::declarative::ctor! {
-    #[ctor(unsafe)]
-    fn before_main() {
-        hybank::memory::share_heap();
-        hybank::files::note_closed_streams();
-    }
-}
 
 /// Lets several slow, imperfectly timed converters do the work of one fast converter
 ///
@@ -109,21 +98,11 @@ enum Command {
 /// Runs the command that was typed; the exit code is 0 (done), 1 (the input or the design failed) or
 /// 2 (wrong usage).
 fn main() -> ExitCode {
-    #[cfg(unix)]
-    hybank::files::fail_at_file_size_limit();
+    interrupts::handle();
     match arguments::<Cli>() {
-        Ok(cli) => PROGRAM.end(check_base().and_then(|()| dispatch(cli.command))),
+        Ok(cli) => PROGRAM.end(dispatch(cli.command)),
         Err(message) => PROGRAM.show(&message),
     }
-}
-
-/// Bytes that a command takes whatever its input: threads, blocks of samples, pictures.
-const BASE_BYTES: f64 = 24e6;
-
-/// Refuses to begin where the process may not even use that.
-fn check_base() -> Result<(), Failure> {
-    check_memory(BASE_BYTES)
-        .map_err(|shortage| Failure::Input(format!("a run takes {shortage}; raise the limit of its memory")))
 }
 
 fn dispatch(command: Command) -> Result<(), Failure> {

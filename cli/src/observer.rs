@@ -1,30 +1,24 @@
 //! The observer of a run: reports what happens while it happens, as lines on standard error and as JSON
-//! lines in the file of `--report`, and checks the captures. A thread of its own writes, so that the samples
-//! never wait for a reader of messages.
+//! lines in the file of `--report`, and checks the captures.
 
 use super::capture_check::{CaptureCheck, Checked};
-use super::event::{Event, EventWriter, Events, ReportFile, Span};
-use super::print::{Failure, is_dash};
-use super::print::{failed, say_line};
-use crossbeam_channel::{Receiver, RecvTimeoutError, bounded};
+use super::event::{Event, Events, Span};
+use super::print::{Failure, failed, is_dash, say_line};
 use hybank::bank::Bank;
 use hybank::io::{PcmFrames, StallWatch};
 use hybank::pipeline::{Gap, Pipeline};
 use hybank::runtime::Input;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex, MutexGuard};
-use std::thread::{Builder, JoinHandle};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Events that wait to be written; further ones are counted only.
-const WAITING: usize = 4096;
-/// Time between two looks whether the thread that empties a full queue still runs.
-const FULL_QUEUE: Duration = Duration::from_millis(50);
-/// Time after which an input that gives nothing, or a gap that goes on, is reported.
+/// Least time between two looks at what happens often, so that a line of each kind counts what it leaves out.
+const INTERVAL: Duration = Duration::from_secs(1);
+/// Time after which an input that gives nothing is reported.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Longest sleep of the writer.
-const LONG: Duration = Duration::from_secs(3600);
+/// Samples of a gap that is reported before it ends: a second, and no fewer than these.
+const LONG_GAP: f64 = 1000.0;
 
 /// The option of the commands that fuse.
 #[derive(Debug, clap::Args)]
@@ -55,52 +49,72 @@ impl ObserverArgs {
         Err(Failure::Usage(message.into()))
     }
 
-    /// Begins to observe a run.
-    pub(super) fn begin(&self, force: bool) -> Result<RunObserver, Failure> {
-        let report = self.report().map(|path| ReportFile::create(path, force)).transpose()?;
-        Ok(RunObserver::begin(EventWriter::new(report, Instant::now(), Box::new(say_line))))
+    /// Begins to observe a run of a bank. In a `live` run standard error has what happens at once.
+    pub(super) fn begin(&self, bank: &Bank, force: bool, live: bool) -> Result<RunObserver, Failure> {
+        let counts = Counts::default();
+        Ok(RunObserver {
+            events: Events::begin(self.report(), force)?,
+            check: None,
+            is_live: live,
+            written: counts,
+            said: counts,
+            due: Instant::now(),
+            long_gap: (1.0 / bank.slow_period().0).max(LONG_GAP) as u64,
+            long_gaps: BTreeSet::new(),
+        })
     }
 }
 
 /// Observes a run.
 pub(super) struct RunObserver {
     events: Events,
-    waiting: Receiver<Option<Event>>,
-    writer: Arc<Mutex<EventWriter>>,
-    /// Without one, the observer writes step by step.
-    thread: Option<JoinHandle<()>>,
     check: Option<CaptureCheck>,
-    /// What has been reported.
+    is_live: bool,
+    /// What the report has, and what standard error has.
+    written: Counts,
+    said: Counts,
+    /// When standard error may have the next lines of what happens often.
+    due: Instant,
+    /// Samples of a long gap, and those that were reported before their ends.
+    long_gap: u64,
+    long_gaps: BTreeSet<[u64; 2]>,
+}
+
+/// What has happened by a moment of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Counts {
     frames: u64,
     samples: u64,
     gaps: usize,
     replaced: u64,
     clipped: u64,
-    /// The gap of each channel that goes on.
-    open: Vec<OpenGap>,
 }
 
-/// A gap that goes on.
-#[derive(Debug, Clone, Copy)]
-struct OpenGap {
-    channel: usize,
-    first: u64,
-    since: Instant,
-    is_reported: bool,
+impl Counts {
+    /// What was replaced and clipped until `later`.
+    fn spans(&self, later: &Self) -> impl Iterator<Item = Event> {
+        let replaced = span(self.frames, later.frames, later.replaced - self.replaced).map(Event::Replaced);
+        let clipped = span(self.samples, later.samples, later.clipped - self.clipped).map(Event::Clipped);
+        replaced.into_iter().chain(clipped)
+    }
+}
+
+/// So many samples from `begin` to before `end`, if there are any.
+fn span(begin: u64, end: u64, samples: u64) -> Option<Span> {
+    (samples > 0).then(|| Span { first: begin, last: end.saturating_sub(1).max(begin), samples })
+}
+
+/// The last of some gaps, and how many there are.
+fn gap_line(gaps: &[Gap]) -> Option<String> {
+    let last = Event::Gap(*gaps.last()?);
+    let missing: u64 = gaps.iter().map(|gap| gap.length).sum();
+    Some(match gaps.len() {
+        1 => last.to_string(),
+        count => format!("{last}; {count} gaps with {missing} samples since the last line"),
+    })
 }
 
 impl RunObserver {
-    fn begin(writer: EventWriter) -> Self {
-        let (messages, waiting) = bounded(WAITING);
-        let writer = Arc::new(Mutex::new(writer));
-        let (shared, received) = (Arc::clone(&writer), waiting.clone());
-        let thread = Builder::new().name("events".into()).spawn(move || write_all(&shared, &received)).ok();
-        let events = Events { messages, dropped: Arc::default() };
-        let (check, open) = (None, Vec::new());
-        let [frames, samples, replaced, clipped] = [0; 4];
-        Self { events, waiting, writer, thread, check, frames, samples, gaps: 0, replaced, clipped, open }
-    }
-
     /// Where other threads report events.
     pub(super) fn events(&self) -> Events {
         self.events.clone()
@@ -109,13 +123,13 @@ impl RunObserver {
     /// Where the readers report inputs that give nothing.
     pub(super) fn stall_watch(&self) -> StallWatch {
         let events = self.events();
-        StallWatch { patience: PATIENCE, report: Arc::new(move |stall| events.report(stall.into())) }
+        StallWatch { patience: PATIENCE, report: Arc::new(move |stall| events.tell(&stall.into())) }
     }
 
-    /// From now on the captures are compared with the spec of the bank, if they are `comparable`. In a
-    /// `live` run the warnings come as soon as they are known.
-    pub(super) fn check_captures(&mut self, bank: &Bank, comparable: bool, live: bool) {
-        self.check = Some(CaptureCheck::new(bank, comparable, live.then(|| self.events())));
+    /// From now on the captures are compared with the spec of the bank, if they are `comparable`. In a live
+    /// run the warnings come as soon as they are known.
+    pub(super) fn check_captures(&mut self, bank: &Bank, comparable: bool) {
+        self.check = Some(CaptureCheck::new(bank, comparable, self.is_live.then(|| self.events())));
     }
 
     /// What the comparison found.
@@ -128,47 +142,44 @@ impl RunObserver {
         if let Some(check) = &mut self.check {
             check.observe(recordings);
         }
-        let frames = self.frames + recordings.frames() as u64;
-        let (samples, replaced, clipped) = (pipeline.samples(), pipeline.replaced(), pipeline.clipped());
-        if replaced > self.replaced {
-            self.events.report(Event::Replaced(span(self.frames, frames, replaced - self.replaced)));
-        }
-        if clipped > self.clipped {
-            self.events.report(Event::Clipped(span(self.samples, samples, clipped - self.clipped)));
-        }
-        (self.frames, self.samples, self.replaced, self.clipped) = (frames, samples, replaced, clipped);
-        let gaps = pipeline.gaps();
-        gaps[self.gaps..].iter().for_each(|&gap| self.events.report(Event::Gap(gap)));
-        self.gaps = gaps.len();
-        self.open_gaps(pipeline);
-        if self.thread.is_none()
-            && let Some(mut writer) = self.writer()
-        {
-            writer.say_due(Instant::now());
+        let now = Counts {
+            frames: self.written.frames + recordings.frames() as u64,
+            samples: pipeline.samples(),
+            gaps: pipeline.gaps().len(),
+            replaced: pipeline.replaced(),
+            clipped: pipeline.clipped(),
+        };
+        pipeline.gaps()[self.written.gaps..].iter().for_each(|&gap| self.events.write(&Event::Gap(gap)));
+        self.written.spans(&now).for_each(|event| self.events.write(&event));
+        self.written = now;
+        self.report_long_gaps(pipeline);
+        if self.is_live && Instant::now() >= self.due {
+            self.say(pipeline.gaps());
         }
     }
 
-    fn open_gaps(&mut self, pipeline: &Pipeline<'_>) {
-        let known = std::mem::take(&mut self.open);
-        for gap in pipeline.open_gaps() {
-            let Gap { channel, first, .. } = gap;
-            let is_this = |open: &&OpenGap| (open.channel, open.first) == (channel, first);
-            let new = OpenGap { channel, first, since: Instant::now(), is_reported: false };
-            let mut open = known.iter().find(is_this).copied().unwrap_or(new);
-            if !open.is_reported && open.since.elapsed() >= PATIENCE {
-                self.events.report(Event::GapGoesOn(gap));
-                open.is_reported = true;
+    /// Says what has happened since the last time.
+    fn say(&mut self, gaps: &[Gap]) {
+        let gap = gap_line(&gaps[self.said.gaps..]);
+        let spans = self.said.spans(&self.written).map(|event| event.to_string());
+        for line in gap.into_iter().chain(spans) {
+            say_line(&line);
+            self.due = Instant::now() + INTERVAL;
+        }
+        self.said = self.written;
+    }
+
+    fn report_long_gaps(&mut self, pipeline: &Pipeline<'_>) {
+        for gap in pipeline.open_gaps().filter(|gap| gap.length >= self.long_gap) {
+            if self.long_gaps.insert([gap.channel as u64, gap.first]) {
+                self.events.tell(&Event::GapGoesOn(gap));
             }
-            self.open.push(open);
         }
     }
 
-    /// Nothing more is said on standard error; gives whether gaps were.
-    pub(super) fn quiet(&mut self) -> bool {
-        self.writer().is_some_and(|mut writer| {
-            writer.quiet(Instant::now());
-            writer.has_said_gaps
-        })
+    /// Whether standard error had gaps before the end of the run.
+    pub(super) fn has_said_gaps(&self) -> bool {
+        self.said.gaps > 0 || !self.long_gaps.is_empty()
     }
 
     /// Ends the report with the summary of the run.
@@ -178,57 +189,16 @@ impl RunObserver {
         if let (Some(last), serde_json::Value::Object(summary)) = (last.as_object_mut(), summary) {
             last.extend(summary);
         }
-        self.end_with(last)
+        self.events.write(&last);
+        self.events.check()
     }
 
     /// Ends the report of a run that failed.
     pub(super) fn fail(&mut self, failure: &Failure) {
         if let Failure::Input(message) | Failure::Usage(message) = failure {
-            // The failure itself is what matters.
-            let _ = self.end_with(serde_json::json!({ "event": "error", "message": message }));
+            self.events.write(&serde_json::json!({ "event": "error", "message": message }));
         }
     }
-
-    fn end_with(&mut self, mut last: serde_json::Value) -> Result<(), Failure> {
-        let dropped = self.events.dropped.load(Ordering::Relaxed);
-        if let Some(last) = last.as_object_mut().filter(|_| dropped > 0) {
-            last.insert("events_dropped".into(), dropped.into());
-        }
-        let died = || failed("the thread that reports events has died, so reports are incomplete");
-        self.writer().ok_or_else(died)?.end(&last, Instant::now()).map_err(Failure::Input)
-    }
-
-    /// The writer, once it has written what waits; `None` if its thread has died.
-    fn writer(&mut self) -> Option<MutexGuard<'_, EventWriter>> {
-        if let Some(thread) = self.thread.take() {
-            // A thread that has died takes nothing, so that the queue may stay full, and leaves the writer
-            // poisoned.
-            while !thread.is_finished() && self.events.messages.send_timeout(None, FULL_QUEUE).is_err() {}
-            let _ = thread.join();
-        }
-        let mut writer = self.writer.lock().ok()?;
-        self.waiting.try_iter().flatten().for_each(|event| writer.take(event, Instant::now()));
-        Some(writer)
-    }
-}
-
-/// The thread, until the run is over.
-fn write_all(writer: &Mutex<EventWriter>, events: &Receiver<Option<Event>>) {
-    let mut due = LONG;
-    loop {
-        let event = events.recv_timeout(due);
-        let Ok(mut writer) = writer.lock() else { return };
-        match event {
-            Ok(Some(event)) => writer.take(event, Instant::now()),
-            Err(RecvTimeoutError::Timeout) => writer.say_due(Instant::now()),
-            Ok(None) | Err(RecvTimeoutError::Disconnected) => return,
-        }
-        due = writer.next().map_or(LONG, |next| next.saturating_duration_since(Instant::now()));
-    }
-}
-
-fn span(begin: u64, end: u64, samples: u64) -> Span {
-    Span { first: begin, last: end.saturating_sub(1).max(begin), samples }
 }
 
 #[cfg(test)]
@@ -236,15 +206,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_writer_that_died_is_an_error_at_the_end_of_the_run() {
-        let print = Box::new(|line: &str| panic!("{line}"));
-        let mut observer = RunObserver::begin(EventWriter::new(None, Instant::now(), print));
-        // More than the queue holds.
-        for _ in 0..WAITING + 2 {
-            observer.events().report(Event::Warning { text: "a message that cannot be written".into() });
-        }
-        assert!(!observer.quiet());
-        let Err(Failure::Input(message)) = observer.end(&serde_json::json!({})) else { panic!("no failure") };
-        assert!(message.contains("has died"), "{message}");
+    fn a_step_counts_what_happened_since_the_one_before() {
+        let before = Counts { frames: 10, samples: 20, gaps: 1, replaced: 3, clipped: 0 };
+        assert_eq!(before.spans(&before).count(), 0);
+        let later = Counts { frames: 15, samples: 30, gaps: 1, replaced: 5, clipped: 4 };
+        let spans: Vec<String> = before.spans(&later).map(|event| event.to_string()).collect();
+        assert_eq!(
+            spans,
+            [
+                "not finite: 2 input samples of frames 10 to 14 became 0",
+                "clipped: 4 of the output samples 20 to 29"
+            ]
+        );
+    }
+
+    #[test]
+    fn one_line_names_the_last_gap_and_counts_the_others() {
+        let gap = |first| Gap { channel: 2, first, length: 10 };
+        assert_eq!(gap_line(&[]), None);
+        assert_eq!(gap_line(&[gap(5)]).unwrap(), "gap: channel 2, sample 5, 10 missing");
+        let line = gap_line(&[gap(5), gap(50)]).unwrap();
+        assert_eq!(line, "gap: channel 2, sample 50, 10 missing; 2 gaps with 20 samples since the last line");
     }
 }

@@ -1,6 +1,6 @@
 //! The format of output samples, and the files that a run writes.
 
-use super::print::{Failure, PROGRAM, failed, is_dash, warn};
+use super::print::{Failure, failed, is_dash, warn};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hybank::files::refuse_overlaps;
 use hybank::io::{
@@ -96,7 +96,5 @@ pub(super) fn check_files(
     let more = pairs.iter().chain(&arrays).map(|path| path.as_path());
     let inputs: Vec<_> = inputs.iter().copied().chain(more).collect();
     refuse_overlaps(&outputs, &inputs).map_err(failed)?;
-    check_extension(output, container)?;
-    PROGRAM.name_leftovers(&outputs);
-    Ok(())
+    check_extension(output, container)
 }

@@ -186,7 +186,6 @@ fn option(error: &dyn Any) -> Option<&'static str> {
 
 fn of_design(error: &DesignError) -> Option<&'static str> {
     match error {
-        DesignError::TooLong { .. } | DesignError::TooLarge { .. } => Some("--no-limit runs it all the same"),
         DesignError::StoppedWithoutBank { .. } => {
             Some("its limit is ten minutes of the clock, and --no-limit runs it to its end")
         }

@@ -1,13 +1,12 @@
 //! How `fuse` and `stream` run a bank: their common options, the run from its plan to its files, the report.
 
-use super::bank_file;
 use super::capture_args::{InterleavedArgs, ScaleArgs, check_stdin, output_rate};
 use super::file_kind::unreadable;
 use super::gaps::{GapArgs, say_gaps};
 use super::interrupt::interrupts;
 use super::observer::{ObserverArgs, RunObserver};
 use super::output::{begin_samples, check_files};
-use super::print::{Failure, check_strict, failed, stopped, warn, with_remains};
+use super::print::{Failure, InFile, check_strict, failed, stopped, warn, with_remains};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hybank::bank::Bank;
 use hybank::captures::{Converters, FileFormat};
@@ -15,7 +14,6 @@ use hybank::io::{
     Arrival, BLOCK_BYTES, Container, MultiReader, OutputHeader, OutputNotes, PcmFormat, PcmFrames, Placement,
     ReadOptions, is_sigmf,
 };
-use hybank::memory::affordable_threads;
 use hybank::pipeline::{DroppedLatency, FileOutputs, Outcome, Pipeline, Settings, Warning};
 use hybank::runtime::{Algorithm, Input, Options, Plan, Precision, ThreadPool};
 use std::path::{Path, PathBuf};
@@ -56,9 +54,7 @@ fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
         PossibleValue::new(algorithm.name()).help(match algorithm {
             Algorithm::Auto => "The fastest algorithm that suits the command",
             Algorithm::Direct => "Computes every product; adds no latency",
-            Algorithm::OverlapSave { .. } => {
-                "Fourier transforms of blocks; faster for long filters, adds latency"
-            }
+            Algorithm::OverlapSave => "Fourier transforms of blocks; faster for long filters, adds latency",
             _ => "",
         })
     });
@@ -68,7 +64,8 @@ fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
 impl RunArgs {
     /// Threads beside the calling one, if it does not do all.
     fn workers(&self) -> Result<Option<ThreadPool>, Failure> {
-        let threads = affordable_threads(Some(self.threads.into()).filter(|&threads| threads > 0));
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = if self.threads == 0 { cores() } else { self.threads.into() };
         if threads == 1 {
             return Ok(None);
         }
@@ -132,9 +129,6 @@ pub(super) struct Finished {
 
 impl Job<'_> {
     /// Begins to read inputs of this format.
-    ///
-    /// # Errors
-    /// [`Failure`], also for an interrupt that came first: no output has been begun.
     pub(super) fn start_reader(
         &self,
         inputs: &[PathBuf],
@@ -142,7 +136,7 @@ impl Job<'_> {
         observer: Option<&RunObserver>,
     ) -> Result<MultiReader, Failure> {
         let args = self.args;
-        let lost = args.gaps.lost_samples(self.is_live)?;
+        let lost = args.gaps.lost_samples()?;
         let converters = Converters::from(self.bank);
         let interleaving = args.interleaved.interleaving(&converters, self.bank_path)?;
         let stalls = observer.map(RunObserver::stall_watch);
@@ -150,8 +144,8 @@ impl Job<'_> {
         let block_bytes = if args.threads == 1 { BLOCK_BYTES } else { 8 * BLOCK_BYTES };
         let own = converters.options(format, inputs.len(), interleaving.as_ref());
         let files = ReadOptions { block_bytes, stalls: stalls.as_ref(), ..own };
-        let started = MultiReader::start(inputs, args.gaps.read_options(&lost, files), interrupts());
-        let reader = started.map_err(unreadable)?.ok_or_else(|| interrupted(0))?;
+        let started = MultiReader::start(inputs, args.gaps.read_options(lost.as_ref(), files));
+        let reader = started.map_err(unreadable)?;
         self.scale.check(&reader)?;
         Ok(reader)
     }
@@ -168,9 +162,9 @@ impl Job<'_> {
         self.settings().options(options)
     }
 
-    /// The plan of the run, whose samples may be complex: a stream for each part.
-    pub(super) fn plan(&self, may_be_complex: bool) -> Result<Plan, Failure> {
-        bank_file::plan(self.bank, self.options(), 1 + usize::from(may_be_complex), self.bank_path)
+    /// The plan of the run.
+    pub(super) fn plan(&self) -> Result<Plan, Failure> {
+        self.bank.plan(self.options()).in_file(self.bank_path)
     }
 
     /// The rate of the output in hertz, if the inputs fit the bank.
@@ -191,9 +185,13 @@ impl Job<'_> {
         let settings = Settings { workers: workers.as_ref(), ..self.settings() };
         let pipeline = Pipeline::new(self.bank, plan, settings, self.format, is_complex);
         let mut outputs = self.outputs(rate, is_complex)?;
-        // What is recorded live cannot be recorded again.
-        let kept = if self.is_live { outputs.keep() } else { Vec::new() };
-        observer.check_captures(self.bank, !is_complex, self.is_live);
+        let mut kept = Vec::new();
+        if self.is_live {
+            // What is recorded live cannot be recorded again.
+            kept = outputs.keep();
+            reader.stop_at(interrupts());
+        }
+        observer.check_captures(self.bank, !is_complex);
         let finished = self.record(pipeline, reader, outputs, observer, each);
         finished.map_err(|failure| with_remains(failure, &kept))
     }
@@ -244,16 +242,12 @@ impl Job<'_> {
         observer: &mut RunObserver,
         each: &dyn Fn(u64),
     ) -> Result<bool, Failure> {
-        let is_stopped = each_block(reader, |recordings| {
+        each_block(reader, |recordings| {
             pipeline.push(recordings, &mut |block| outputs.write(block)).map_err(stopped)?;
             observer.step(recordings, pipeline);
             each(recordings.frames() as u64);
             Ok(())
-        })?;
-        match is_stopped {
-            true if !self.is_live => Err(interrupted(reader.consumed())),
-            _ => Ok(is_stopped),
-        }
+        })
     }
 
     /// Brings out the last samples, if they are wanted, of a run of so many frames.
@@ -307,13 +301,13 @@ impl Job<'_> {
         &self,
         outputs: FileOutputs,
         report: &RunReport,
-        observer: &mut RunObserver,
+        observer: &RunObserver,
     ) -> Result<(), Failure> {
         let judged = check_strict(&report.warnings, self.args.strict);
         if judged.is_ok() {
             outputs.finish().map_err(stopped)?;
         }
-        let are_said = observer.quiet();
+        let are_said = observer.has_said_gaps();
         report.outcome.gaps.iter().for_each(|gaps| say_gaps(gaps, are_said));
         judged?;
         report.warnings[..report.warnings.len() - report.reported].iter().for_each(|warning| warn(warning));
@@ -336,11 +330,6 @@ pub(super) fn each_block(
             Arrival::Stopped => return Ok(true),
         }
     }
-}
-
-/// How an interrupt ends a run whose outputs are whole or absent.
-pub(super) fn interrupted(frames: u64) -> Failure {
-    Failure::Input(format!("interrupted after {frames} frames; nothing was kept, run it again"))
 }
 
 /// What every command that fuses reports.

@@ -332,6 +332,7 @@ impl Rates {
             ));
         }
         let mut rates = [all.as_slice(), &[fast]].concat();
+        rates.sort_by(f64::total_cmp);
         rates.dedup();
         let uneven = rates.into_iter().filter(|rate| !is_same_rate(rate.round(), *rate, 0.0));
         let warning =
@@ -353,4 +354,20 @@ impl Rates {
 fn number(rate: f64) -> serde_json::Value {
     let is_whole = rate.fract() == 0.0 && rate < (1u64 << 53) as f64;
     if is_whole { (rate as u64).into() } else { rate.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The rates of the channels come in any order.
+    #[test]
+    fn a_rate_that_several_channels_have_is_warned_of_once() {
+        let (rates, warnings) = Rates { slow: vec![10.4, 20.7, 10.4], fast: 20.7 }.whole().unwrap();
+        assert_eq!((rates.slow, rates.fast), (vec![10.0, 21.0, 10.0], 21.0));
+        let said = |rate: &str, whole: &str| {
+            format!("WAV headers hold whole hertz: {rate} Hz is written as {whole} Hz")
+        };
+        assert_eq!(warnings, [said("10.4", "10"), said("20.7", "21")]);
+    }
 }

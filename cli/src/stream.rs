@@ -101,7 +101,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let bank = bank_file::load(&args.bank)?;
     say_understood(bank.spec.as_ref());
     args.check_inputs(&inputs, bank.channel_count())?;
-    let mut observer = args.run.observer.begin(args.run.force)?;
+    let mut observer = args.run.observer.begin(&bank, args.run.force, true)?;
     let job = args.job(&bank);
     args.stream(&job, &inputs, &mut observer).inspect_err(|failure| observer.fail(failure))
 }
@@ -126,7 +126,7 @@ impl Args {
 
     fn stream(&self, job: &Job<'_>, inputs: &[PathBuf], observer: &mut RunObserver) -> Result<(), Failure> {
         // Before the inputs come; their headers may say complex samples.
-        let plan = job.plan(true)?;
+        let plan = job.plan()?;
         let channels = self.channels.map(usize::from);
         let format = FileFormat { coding: self.format, channels, only: None, full_scale: self.scale.given() };
         let mut reader = job.start_reader(inputs, format, Some(observer))?;

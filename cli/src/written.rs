@@ -1,18 +1,15 @@
 //! Writes files that appear when they are whole: texts, pictures, recordings, and folders of them.
 
-use super::interrupt::remove_unfinished;
-use super::print::{Failure, PROGRAM, failed, failed_at, is_dash, print_bytes};
+use super::print::{Failure, failed, failed_at, is_dash, print_bytes};
 use hybank::files::{self, AtomicFile, FileError, commit_all, refuse_overlaps};
 use hybank::io::{Container, OutputHeader, PcmFormat, SampleWriter, is_pipe, is_sigmf};
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
-/// Refuses outputs that are also inputs or other outputs, and names what killed runs left beside them.
+/// Refuses outputs that are also inputs or other outputs.
 pub(super) fn check_outputs(outputs: &[&Path], inputs: &[&Path]) -> Result<(), Failure> {
     let outputs: Vec<&Path> = outputs.iter().copied().filter(|path| !is_dash(path)).collect();
-    refuse_overlaps(&outputs, inputs).map_err(failed)?;
-    PROGRAM.name_leftovers(&outputs);
-    Ok(())
+    refuse_overlaps(&outputs, inputs).map_err(failed)
 }
 
 /// As [`check_outputs`], for one file that may be begun when the work is done.
@@ -36,7 +33,6 @@ pub(super) fn write_bytes(path: &Path, bytes: &[u8], force: bool) -> Result<(), 
 
 /// A file that is whole but has no name yet.
 pub(super) fn begin_file(path: &Path, bytes: &[u8], force: bool) -> Result<AtomicFile, Failure> {
-    remove_unfinished();
     let mut file = AtomicFile::create(path, force).map_err(failed)?;
     file.write_all(bytes).map_err(|error| failed_at(path, format!("cannot write it: {error}")))?;
     Ok(file)
@@ -159,7 +155,6 @@ pub(super) fn write_recordings(files: &[(&Path, Mono<'_>)], force: bool) -> Resu
 
 /// The files of a recording, which are whole but have no names yet: two of a SigMF recording.
 pub(super) fn begin_recording(path: &Path, mono: Mono<'_>, force: bool) -> Result<Vec<AtomicFile>, Failure> {
-    remove_unfinished();
     let mut files = match mono.ordinary_wav(path) {
         Some(spec) => {
             let mut file = AtomicFile::create(path, force).map_err(failed)?;

@@ -43,7 +43,7 @@ impl Signal {
         let channels: Vec<&[f64]> = self.captured.channels.iter().map(Vec::as_slice).collect();
         let mut fused = vec![0.0; self.target().len()];
         let causal = Settings { dropped: DroppedLatency::Added, ..Settings::default() };
-        fuse(bank, &plan, &[Planar::new(&channels)?], &mut fused[..], causal, &|| false)?;
+        fuse(bank, &plan, &[&Planar::new(&channels)?], &mut fused.as_mut_slice(), causal, &|| false)?;
         Ok(self.target().iter().zip(fused).map(|(wanted, y)| wanted - y).collect())
     }
 }

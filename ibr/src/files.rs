@@ -2,7 +2,6 @@
 //! files.
 
 use hybank::files::{self, Bound, FileError};
-use hybank::memory::check_memory;
 use hybank::messages::Quoted;
 use std::path::{Path, PathBuf};
 
@@ -11,6 +10,7 @@ pub(crate) const CHECK_THE_PATH: &str = "check the path (paths in a scene are re
 
 const IMAGE: Bound = Bound { bytes: 1 << 30, kind: "an image or map", remedy: "shrink it" };
 const TEXT: Bound = Bound { bytes: 1 << 28, kind: "a text file", remedy: "is it the right file?" };
+const SCENE: Bound = Bound { bytes: 1 << 24, kind: "a scene file", remedy: "is it the right file?" };
 
 /// What is wrong with a file (a scene, tracks, cameras, images or maps), or with images that do not fit.
 #[derive(Debug, thiserror::Error)]
@@ -79,7 +79,7 @@ pub(crate) fn read_bytes(path: &Path, remedy: &'static str) -> Result<Vec<u8>, I
     files::read_bytes(path, IMAGE).map_err(|source| unread(source, remedy))
 }
 
-/// The text of a file, if there is memory for parsing it.
+/// The text of a file.
 pub(crate) fn read_text(path: &Path, remedy: &'static str) -> Result<String, InputError> {
     files::read_text(path, TEXT).map_err(|source| unread(source, remedy))
 }
@@ -92,26 +92,14 @@ fn unread(source: FileError, remedy: &'static str) -> InputError {
     }
 }
 
-/// Refuses a file that takes more memory, in bytes, than this process may use.
-pub(crate) fn refuse_without_memory(path: &Path, bytes: f64) -> Result<(), InputError> {
-    let refused =
-        |shortage| format!("to read it takes {shortage}; allow more memory, or give the file that was meant");
-    check_memory(bytes).map_err(|shortage| InputError::file(path, refused(shortage)))
+/// The text of a scene file.
+#[cfg(feature = "cli")]
+pub(crate) fn read_scene(path: &Path) -> Result<String, InputError> {
+    files::read_text(path, SCENE).map_err(|source| unread(source, "check the path"))
 }
 
-/// Refuses an image of a file that takes more memory, by its bytes per pixel, than this process may use.
-pub(crate) fn refuse_pixels_without_memory(
-    path: &Path,
-    (width, height): (usize, usize),
-    per_pixel: f64,
-) -> Result<(), InputError> {
-    let refused = |shortage| format!("{width} x {height} pixels take {shortage}; crop or shrink the image");
-    check_memory(per_pixel * width as f64 * height as f64)
-        .map_err(|shortage| InputError::file(path, refused(shortage)))
-}
-
-/// The text of a stream called `name`.
+/// The text of a scene from a stream called `name`.
 #[cfg(feature = "cli")]
 pub(crate) fn text(stream: impl std::io::Read, name: &str) -> Result<String, FileError> {
-    files::text_in(files::bytes_of(stream, name, TEXT)?, name)
+    files::text_in(files::bytes_of(stream, name, SCENE)?, name)
 }

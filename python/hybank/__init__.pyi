@@ -121,7 +121,6 @@ class Bank:
         accumulator: int | None = None,
         clocks_per_frame: int | None = None,
         pipeline: int | None = None,
-        multipliers: Literal["inferred", "shift-add"] | None = None,
         testbench: _Path | None = None,
         random_frames: int | None = None,
         overwrite: bool = True,
@@ -280,8 +279,8 @@ def design(
     *,
     replace: Mapping[str, Any] | None = None,
     proof: bool = True,
-    limits: bool = True,
-    progress: Callable[[str, float], object] | None = None,
+    limit: bool = True,
+    progress: Callable[[str], object] | None = None,
 ) -> Bank: ...
 @overload
 def design(
@@ -308,13 +307,12 @@ def design(
     bits: int | Sequence[int] | np.integer[Any] | NDArray[Any] | None = None,
     fraction_bits: int | np.integer[Any] | None = None,
     loss_db: float | np.number[Any] | None = None,
-    digits: bool | None = None,
     order: int | np.integer[Any] | None = None,
     reduction_loss_db: float | np.number[Any] | None = None,
     noise: float | np.number[Any] | None = None,
     proof: bool = True,
-    limits: bool = True,
-    progress: Callable[[str, float], object] | None = None,
+    limit: bool = True,
+    progress: Callable[[str], object] | None = None,
 ) -> Bank: ...
 def import_taps(spec: Bank | _Spec, taps: ArrayLike, *, latency: int | None = None, proof: bool = True) -> Bank: ...
 def load(path: _Path) -> Bank: ...

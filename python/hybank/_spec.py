@@ -6,7 +6,7 @@ from hybank._hybank import design as _design
 from hybank._keywords import checked
 
 _DESIGN_KEYS = (
-    "method", "taps", "target_snr_db", "gamma_margin", "bits", "fraction_bits", "loss_db", "digits", "order",
+    "method", "taps", "target_snr_db", "gamma_margin", "bits", "fraction_bits", "loss_db", "order",
     "reduction_loss_db", "noise",
 )
 # Every form of a filter has one of these keys.
@@ -21,8 +21,8 @@ def _given(**entries):
 def design(
     source=None, /, *, name=None, fast_rate=None, fast_period=None, ratio=None, latency=None, target=None, channels=None,
     channel=None, signal=None, uncertainty=None, full_scale=None, fit=None, design=None, method=None, taps=None,
-    target_snr_db=None, gamma_margin=None, bits=None, fraction_bits=None, loss_db=None, digits=None, order=None,
-    reduction_loss_db=None, noise=None, replace=None, proof=True, limits=True, progress=None
+    target_snr_db=None, gamma_margin=None, bits=None, fraction_bits=None, loss_db=None, order=None,
+    reduction_loss_db=None, noise=None, replace=None, proof=True, limit=True, progress=None
 ):
     """Design the bank of a spec: a path, a TOML text of several lines, a mapping, or keywords.
 
@@ -68,8 +68,6 @@ def design(
         A tap is its integer times 2^-fraction_bits.
     loss_db : float, optional
         Integer taps of the fewest bits that lose at most so many decibels of SNR.
-    digits : bool, optional
-        With loss_db: the fewest signed digits, for multiplication by shifts and adders.
     order : int, optional
         At most so many states (methods iir and h2).
     reduction_loss_db : float, optional
@@ -80,10 +78,10 @@ def design(
         With `source`: `latency` and the keys from `method` on, in place of those of the spec.
     proof : bool
         Search a proof of gamma.
-    limits : bool
-        Refuse designs of more than ten minutes or more memory than there is.
+    limit : bool
+        End the design after ten minutes with the best bank so far.
     progress : callable, optional
-        ``progress(step, seconds)`` is called for every step, with the estimated seconds of the whole design.
+        ``progress(step)`` is called for every step.
 
     Returns
     -------
@@ -101,7 +99,7 @@ def design(
     given = dict(locals())
     keywords = {
         key: value for key, value in given.items()
-        if value is not None and key not in ("source", "replace", "proof", "limits", "progress")
+        if value is not None and key not in ("source", "replace", "proof", "limit", "progress")
     }
     replaced = dict(replace or {})
     latency = replaced.pop("latency", None)
@@ -113,7 +111,7 @@ def design(
         raise TypeError(
             f"give a spec or keywords, not both: {', '.join(keywords)}; replace={{..}} changes keys of [design]"
         )
-    return _design(source, replaced, latency, proof, limits, progress)
+    return _design(source, replaced, latency, proof, limit, progress)
 
 
 def _of_keywords(keywords):

@@ -14,8 +14,8 @@ const POLL: Duration = Duration::from_millis(20);
 const STACK_BYTES: usize = 16 << 20;
 
 enum Message<T> {
-    /// A step begins, of a computation of so many seconds.
-    Stage(Stage, f64),
+    /// A step begins.
+    Stage(Stage),
     Done(T),
 }
 
@@ -27,9 +27,9 @@ pub(crate) struct Reporter<T> {
 
 impl<T> Reporter<T> {
     /// Reports that a step begins.
-    pub(crate) fn begins(&self, stage: Stage, seconds: f64) {
+    pub(crate) fn begins(&self, stage: Stage) {
         // The receiver lives as long as somebody waits.
-        let _ = self.sender.send(Message::Stage(stage, seconds));
+        let _ = self.sender.send(Message::Stage(stage));
     }
 
     /// Due when the result is no longer waited for.
@@ -39,8 +39,7 @@ impl<T> Reporter<T> {
 }
 
 /// Runs `work` on a thread of its own, without the interpreter lock. A signal whose handler raises ends the
-/// wait at once; a design ends with the round that it is in. `progress(step, seconds)` is called for every
-/// step.
+/// wait at once; a design ends with the round that it is in. `progress(step)` is called for every step.
 pub(crate) fn run<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -58,7 +57,7 @@ pub(crate) fn run<T: Send + 'static>(
         let inbox = &mut messages;
         match py.detach(move || inbox.recv_timeout(POLL)) {
             Ok(Message::Done(result)) => return Ok(result),
-            Ok(Message::Stage(stage, seconds)) => report(progress, stage, seconds)?,
+            Ok(Message::Stage(stage)) => report(progress, stage)?,
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(refused("the computation ended without a result; this is a fault of hybank"));
@@ -73,9 +72,9 @@ pub(crate) fn run<T: Send + 'static>(
     result
 }
 
-fn report(progress: Option<&Bound<'_, PyAny>>, stage: Stage, seconds: f64) -> PyResult<()> {
+fn report(progress: Option<&Bound<'_, PyAny>>, stage: Stage) -> PyResult<()> {
     let Some(progress) = progress else { return Ok(()) };
-    progress.call1((stage.to_string(), seconds)).map(drop)
+    progress.call1((stage.to_string(),)).map(drop)
 }
 
 /// Time between two checks. Each waits for the interpreter lock, up to 5 ms while other threads keep it.

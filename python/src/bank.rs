@@ -62,7 +62,7 @@ impl Bank {
     #[pyo3(
         signature = (
             path, *, format, name = "bank", input_bits = None, output_bits = None, accumulator = None,
-            clocks_per_frame = None, pipeline = None, multipliers = None, testbench = None, random_frames = None,
+            clocks_per_frame = None, pipeline = None, testbench = None, random_frames = None,
             overwrite = true
         )
     )]
@@ -77,7 +77,6 @@ impl Bank {
         accumulator: Option<u32>,
         clocks_per_frame: Option<u32>,
         pipeline: Option<u32>,
-        multipliers: Option<&str>,
         testbench: Option<PathBuf>,
         random_frames: Option<u32>,
         overwrite: bool,
@@ -88,7 +87,6 @@ impl Bank {
             accumulator,
             clocks_per_frame,
             pipeline,
-            multipliers,
             testbench,
             random_frames,
         };

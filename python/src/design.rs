@@ -4,7 +4,7 @@ use crate::background;
 use crate::bank::Bank;
 use crate::errors::{refused, spec_error, warn};
 use crate::{sources, values};
-use hybank::design::{Design, DesignError, Effort, Limits, Options, ProofSearch, judge_taps, warnings};
+use hybank::design::{Design, DesignError, Options, ProofSearch, TIME_LIMIT, judge_taps, warnings};
 use hybank::spec::DesignOverrides;
 use pyo3::prelude::*;
 
@@ -15,7 +15,7 @@ pub(crate) fn design(
     keys: &Bound<'_, PyAny>,
     latency: Option<usize>,
     proof: bool,
-    limits: bool,
+    limit: bool,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Bank> {
     let py = source.py();
@@ -26,10 +26,11 @@ pub(crate) fn design(
         warn(py, &warning)?;
     }
     let proof = if proof { ProofSearch::Run } else { ProofSearch::Skip };
-    let limits = if limits { Limits::Enforced } else { Limits::Off };
+    let time_limit = limit.then_some(TIME_LIMIT);
     let designed = background::run(py, progress, move |reporter| {
-        let observer = |stage, effort: Effort| reporter.begins(stage, effort.longest);
-        hybank::design::design(&spec, &Options { proof, limits, observer: &observer, stop: reporter.stop() })
+        let observer = |stage| reporter.begins(stage);
+        let stop = reporter.stop();
+        hybank::design::design(&spec, &Options { proof, time_limit, observer: &observer, stop })
     })?;
     finished(py, designed, proof)
 }

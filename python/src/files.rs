@@ -4,7 +4,7 @@ use crate::bank::Bank;
 use crate::errors::{capture_error, io_error, refused, warn};
 use crate::sources;
 use hybank::captures::{CaptureError, Captures, ChannelSamples, Converters, FileFormat};
-use hybank::io::{LostSamples, MAX_LOST, MultiReader, OfflineError, ReadOptions, TimeInterleaving, Until};
+use hybank::io::{LostSamples, MAX_LOST, MultiReader, ReadOptions, TimeInterleaving, Until};
 use hybank::pipeline::matching;
 use hybank::quantity::{self, FullScale};
 use numpy::{Complex64, PyArray1};
@@ -81,8 +81,8 @@ fn read_for<'py>(
         until: if options.longest { Until::Longest } else { Until::Shortest },
         ..own
     };
-    let read = py.detach(|| {
-        let mut reader = start(files, read_options)?;
+    let read = py.detach(|| -> Result<_, CaptureError> {
+        let mut reader = MultiReader::start(files, read_options)?;
         let output_rate = converters.map(|converters| converters.check("the bank", &reader));
         let output_rate = output_rate.transpose()?.flatten();
         // No bank is there to say whether it takes all rates.
@@ -99,12 +99,6 @@ fn read_for<'py>(
     let arrays: Vec<_> = captures.channels.into_iter().map(|channel| array(py, channel)).collect();
     found.set_item("channels", arrays)?;
     Ok(found)
-}
-
-/// A reader of the headers of all files.
-fn start(files: &[PathBuf], options: ReadOptions<'_>) -> Result<MultiReader, CaptureError> {
-    let started = MultiReader::start(files, options, crossbeam_channel::never())?;
-    started.ok_or(CaptureError::Samples(OfflineError::Stopped))
 }
 
 impl Options {

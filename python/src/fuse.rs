@@ -86,7 +86,7 @@ impl Captures {
         let mut numbers = vec![0.0; frames * channels];
         // There is nothing to load from no frames.
         for part in held.parts()?.iter().filter(|_| frames > 0) {
-            Frames::new(&part[..], 0..frames).load(Isa::detect(), 0, &mut numbers);
+            part.as_slice().load_f64(Isa::detect(), 0, &mut numbers);
         }
         let channel = |i| Record::new(numbers.iter().skip(i).step_by(channels).copied().collect());
         let records: Vec<Record> = (0..channels).map(channel).collect();
@@ -145,7 +145,9 @@ fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Reques
     let plan = plan(bank, format, request.algorithm, settings)?;
     let mut array = NewArray::new(py, frames * bank.ratio, format)?;
     let (parts, mut room) = (held.parts()?, array.room()?);
-    let parts: Vec<_> = parts.iter().map(|part| Frames::new(&part[..], 0..frames)).collect();
+    let parts: Vec<_> = parts.iter().map(Vec::as_slice).collect();
+    let parts: Vec<_> = parts.iter().map(|part| Frames::new(part, 0..frames)).collect();
+    let parts: Vec<&dyn Input> = parts.iter().map(|part| part as _).collect();
     let signals = Signals::new();
     let stop = || signals.raised();
     let outcome = py.detach(|| pipeline::fuse(bank, &plan, &parts, &mut room, settings, &stop));

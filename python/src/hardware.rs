@@ -1,11 +1,11 @@
 //! A bank of integer taps for hardware: the exported circuit, and the model of its bits.
 
 use crate::arrays::{Held, Shape};
-use crate::errors::{choose, file_error, refused, warn};
+use crate::errors::{file_error, refused, warn};
 use crate::outputs::begin_file;
 use hybank::bank::Bank;
 use hybank::files::{commit_all, refuse_overlaps};
-use hybank::interchange::{BitTrue, Circuit, Multipliers, Verilog, VerilogOptions, WordSizes};
+use hybank::interchange::{BitTrue, Circuit, Verilog, VerilogOptions, WordSizes};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use std::num::NonZeroU32;
@@ -16,24 +16,22 @@ const RANDOM_FRAMES: u32 = 1000;
 
 /// The keywords of a circuit.
 #[derive(Debug)]
-pub(crate) struct CircuitKeywords<'a> {
+pub(crate) struct CircuitKeywords {
     pub(crate) output_bits: Option<u32>,
     pub(crate) accumulator: Option<u32>,
     pub(crate) clocks_per_frame: Option<u32>,
     pub(crate) pipeline: Option<u32>,
-    pub(crate) multipliers: Option<&'a str>,
     pub(crate) testbench: Option<PathBuf>,
     pub(crate) random_frames: Option<u32>,
 }
 
-impl CircuitKeywords<'_> {
+impl CircuitKeywords {
     /// Refuses keywords that another format would ignore.
     pub(crate) fn check_none(&self) -> PyResult<()> {
         let numbers = [self.output_bits, self.accumulator, self.clocks_per_frame, self.pipeline];
-        let is_given = numbers.iter().any(Option::is_some) || self.multipliers.is_some();
-        if is_given || self.testbench.is_some() || self.random_frames.is_some() {
+        if numbers.iter().any(Option::is_some) || self.testbench.is_some() || self.random_frames.is_some() {
             return Err(refused(
-                "output_bits, accumulator, clocks_per_frame, pipeline, multipliers, testbench and random_frames \
+                "output_bits, accumulator, clocks_per_frame, pipeline, testbench and random_frames \
                  describe a circuit; give format=\"verilog\" or leave them out",
             ));
         }
@@ -41,16 +39,12 @@ impl CircuitKeywords<'_> {
     }
 
     fn options(&self, input_bits: Option<u32>) -> PyResult<VerilogOptions> {
-        let kinds = [("inferred", Multipliers::Inferred), ("shift-add", Multipliers::ShiftAdd)];
-        let plain = VerilogOptions::default();
-        let multipliers = self.multipliers.map(|name| choose("multipliers", name, &kinds)).transpose()?;
         Ok(VerilogOptions {
             input_bits,
             output_bits: self.output_bits,
             accumulator_bits: self.accumulator,
             clocks_per_frame: at_least_one("clocks_per_frame", self.clocks_per_frame)?,
             pipeline: at_least_one("pipeline", self.pipeline)?,
-            multipliers: multipliers.unwrap_or(plain.multipliers),
         })
     }
 

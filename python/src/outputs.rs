@@ -4,7 +4,7 @@ use crate::arrays::{Held, Shape};
 use crate::errors::{file_error, refused};
 use crate::formats::Format;
 use hybank::files::AtomicFile;
-use hybank::runtime::{Input, Isa, Output, PcmFrames, PcmOutput, Sample};
+use hybank::runtime::{Input, Isa, Output, PcmOutput, Sample};
 use numpy::{PyArray1, PyArrayMethods, PyReadwriteArray1};
 use pyo3::prelude::*;
 use std::io::Write;
@@ -50,16 +50,16 @@ pub(crate) fn encode<'py>(
     let (frames, is_single) = (held.frames(), held.format == Format::F32);
     let clipped = y.py().detach(|| {
         if is_single {
-            convert::<f32>(&parts[0], frames, &mut room);
+            convert::<f32>(&parts[0].as_slice(), frames, &mut room);
         } else {
-            convert::<f64>(&parts[0], frames, &mut room);
+            convert::<f64>(&parts[0].as_slice(), frames, &mut room);
         }
         room.clipped
     });
     Ok((array.finish()?, clipped))
 }
 
-fn convert<T: Sample>(samples: &[PcmFrames<'_>], frames: usize, room: &mut PcmOutput<'_>) {
+fn convert<T: Sample>(samples: &dyn Input, frames: usize, room: &mut dyn Output) {
     let mut numbers = vec![T::default(); frames];
     samples.load(Isa::detect(), 0, &mut numbers);
     room.store(Isa::detect(), 0, &numbers);

@@ -30,7 +30,7 @@ impl State {
             if parts.len() > 1 {
                 room.select(i);
             }
-            stream.run(&part[..], room).map_err(refused)?;
+            stream.run(&part.as_slice(), room).map_err(refused)?;
         }
         *clipped += room.clipped;
         Ok(())

@@ -188,7 +188,6 @@ def test_a_circuit_is_that_of_the_command_line(binary, filters, tmp_path):
         ({"format": "c", "pipeline": 2}, "describe a circuit"),
         ({"format": "verilog", "random_frames": 5}, "belong to a testbench"),
         ({"format": "verilog", "clocks_per_frame": 0}, "clocks_per_frame: 0"),
-        ({"format": "verilog", "multipliers": "none"}, "choose inferred or shift-add"),
         ({"format": "verilog"}, "bits of the samples"),
     ]:
         with pytest.raises(hb.HybankError, match=words):

@@ -181,13 +181,13 @@ def test_implausible_specs_warn_at_the_line_of_the_caller():
 
 def test_progress_is_reported():
     steps = []
-    hb.design(TEXT, progress=lambda step, seconds: steps.append((step, seconds)))
-    assert any("filters" in step for step, _ in steps) and all(seconds > 0 for _, seconds in steps)
+    hb.design(TEXT, progress=steps.append)
+    assert any("filters" in step for step in steps)
 
     class Enough(Exception):
         pass
 
-    def refuse(step, seconds):
+    def refuse(step):
         raise Enough
 
     with pytest.raises(Enough):
@@ -213,7 +213,7 @@ def test_ctrl_c_interrupts_a_long_design_at_once():
     timer.start()
     begin = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        hb.design(LONG, limits=False)
+        hb.design(LONG, limit=False)
     assert time.monotonic() - begin < 2
 
 

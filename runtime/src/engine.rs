@@ -60,11 +60,7 @@ impl Engine {
     }
 
     /// See [`Filter::process`].
-    pub(crate) fn process(
-        &mut self,
-        input: &(impl Input + ?Sized),
-        output: &mut (impl Output + ?Sized),
-    ) -> u64 {
+    pub(crate) fn process(&mut self, input: &dyn Input, output: &mut dyn Output) -> u64 {
         each!(self, it => it.filter.process(&mut it.state, input, output))
     }
 
@@ -72,8 +68,8 @@ impl Engine {
     #[cfg(feature = "rayon")]
     pub(crate) fn process_parallel(
         &mut self,
-        input: &(impl Input + Sync + ?Sized),
-        output: &mut (impl SplitOutput + ?Sized),
+        input: &dyn Input,
+        output: &mut dyn SplitOutput,
         pool: &crate::ThreadPool,
     ) -> u64 {
         use crate::parallel::process;

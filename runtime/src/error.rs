@@ -60,29 +60,17 @@ pub enum BuildError {
         /// The value.
         value: f64,
     },
-    /// No transform of this length holds the filters.
-    #[error(
-        "a transform of {len} frames does not fit filters of {phase_taps} taps per phase: overlap-save needs a power of two from {shortest} to 16777216 that is no shorter than the filters; choose another length or `direct`"
-    )]
-    Transform {
-        /// F.
-        len: usize,
-        /// K.
-        phase_taps: usize,
-        /// The least F.
-        shortest: usize,
-    },
     /// The spectra of the filters would take gigabytes.
     #[error(
-        "the spectra of {channels} x {ratio} filters over {len} frames are too large for overlap-save; choose a shorter transform or `direct`"
+        "the spectra of {channels} x {ratio} filters of {lags} taps per phase are too large for overlap-save; choose `direct`"
     )]
     Spectra {
         /// N.
         channels: usize,
         /// M.
         ratio: usize,
-        /// F.
-        len: usize,
+        /// K.
+        lags: usize,
     },
     /// An algorithm for FIR filters was asked for, but the filters are recursive.
     #[error("{algorithm} needs FIR filters, and this bank is recursive (IIR); use `direct` or `auto`")]

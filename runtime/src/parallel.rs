@@ -6,7 +6,7 @@
 //! up all.
 
 use crate::Sample;
-use crate::adapters::{Frames, Input, SplitOutput};
+use crate::adapters::{Frames, Input, Output, SplitOutput};
 use crate::algorithms::Filter;
 use crate::algorithms::direct::{Direct, DirectState};
 use std::io;
@@ -25,8 +25,8 @@ const CHUNKS_PER_THREAD: usize = 8;
 pub(crate) fn process<T: Sample>(
     filter: &Direct<T>,
     state: &mut DirectState<T>,
-    input: &(impl Input + Sync + ?Sized),
-    output: &mut (impl SplitOutput + ?Sized),
+    input: &dyn Input,
+    output: &mut dyn SplitOutput,
     pool: &ThreadPool,
 ) -> u64 {
     let frames = input.frames();
@@ -45,41 +45,44 @@ pub(crate) fn process<T: Sample>(
 }
 
 /// A call whose chunks are shared out.
-struct Call<'a, T: Sample, I: ?Sized> {
+struct Call<'a, T: Sample> {
     filter: &'a Direct<T>,
-    input: &'a I,
+    input: &'a dyn Input,
     /// Least frames of a chunk.
     chunk: usize,
 }
 
-impl<T: Sample, I: Input + Sync + ?Sized> Call<'_, T, I> {
+impl<T: Sample> Call<'_, T> {
     /// The frames of a range to an output of their own. The first chunk has the stream's `state`, the others
     /// make theirs; returns how many samples were not finite, and the state after the last chunk if it is
     /// not the stream's.
     fn chunks(
         &self,
         frames: Range<usize>,
-        state: Option<&mut DirectState<T>>,
-        output: &mut (impl SplitOutput + ?Sized),
+        mut state: Option<&mut DirectState<T>>,
+        output: &mut dyn SplitOutput,
     ) -> (u64, Option<DirectState<T>>) {
         if frames.len() < 2 * self.chunk {
             return self.chunk(frames, state, output);
         }
         let middle = frames.start + frames.len() / 2;
-        output.halves((middle - frames.start) * self.filter.ratio, |earlier, later| {
+        let mut done = (0, None);
+        output.halves((middle - frames.start) * self.filter.ratio, &mut |earlier, later| {
+            let state = state.take();
             let ((some, _), (more, last)) = rayon::join(
                 || self.chunks(frames.start..middle, state, earlier),
                 || self.chunks(middle..frames.end, None, later),
             );
-            (some + more, last)
-        })
+            done = (some + more, last);
+        });
+        done
     }
 
     fn chunk(
         &self,
         frames: Range<usize>,
         state: Option<&mut DirectState<T>>,
-        output: &mut (impl SplitOutput + ?Sized),
+        output: &mut dyn Output,
     ) -> (u64, Option<DirectState<T>>) {
         let chunk = Frames::new(self.input, frames.clone());
         match state {
@@ -101,7 +104,7 @@ impl<T: Sample, I: Input + Sync + ?Sized> Call<'_, T, I> {
 /// let taps = [vec![0.5, 1.0, 0.5, 0.0], vec![0.0, 0.5, 1.0, 0.5]];
 /// let plan = Plan::from_taps(&taps, 2, 1, Options::default())?;
 /// let (input, mut output) = (vec![0.5f32; 2000], vec![0.0f32; 2000]);
-/// Stream::new(&plan).run_parallel(&Interleaved::new(&input, 2)?, &mut output[..], &pool)?;
+/// Stream::new(&plan).run_parallel(&Interleaved::new(&input, 2)?, &mut output.as_mut_slice(), &pool)?;
 /// assert_eq!(output[1998..], [1.0, 1.0]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -69,21 +69,6 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Bytes of memory that [`Plan::from_taps`] with these arguments and so many streams take, about.
-    ///
-    /// # Errors
-    /// [`BuildError`] if N or M is 0, or the filters are too long for the chosen algorithm.
-    pub fn bytes_of_taps(
-        taps: &[Vec<f64>],
-        ratio: usize,
-        options: Options,
-        streams: usize,
-    ) -> Result<f64, BuildError> {
-        check_counts(taps.len(), ratio)?;
-        let choice = options.algorithm.choose(taps, ratio, options.precision)?;
-        Ok(choice.bytes(taps, ratio, options.precision, streams))
-    }
-
     /// FIR filters: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], where `taps[i][n]` = f_i\[n\] at the
     /// fast rate, i = 1..N, of any lengths, and M = `ratio`. `latency` = m0: the output samples by which the
     /// filters were designed to be late.
@@ -244,9 +229,7 @@ impl ChosenAlgorithm {
     fn filter<T: Sample>(self, taps: &[Vec<f64>], ratio: usize, isa: Isa) -> Result<Fir<T>, BuildError> {
         Ok(match self {
             Self::Direct => Fir::Direct(Running::new(Direct::new(taps, ratio, isa)?)),
-            Self::OverlapSave(len) => {
-                Fir::OverlapSave(Running::new(OverlapSave::new(taps, ratio, len, isa)?))
-            }
+            Self::OverlapSave(shape) => Fir::OverlapSave(Running::new(OverlapSave::new(taps, shape, isa)?)),
         })
     }
 }

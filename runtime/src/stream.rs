@@ -23,7 +23,7 @@ use crate::{Plan, ProcessError, Sample, Shape, StateError, SwapError};
 /// | | NaN or infinity in the input | sums that overflow |
 /// |---|---|---|
 /// | direct | seen in the outputs; frames that they reach filtered again | filtered again at most once |
-/// | overlap-save | replaced first; filtered once | the batch once more, from smaller numbers |
+/// | overlap-save | replaced first; filtered once | filtered once; all outputs of the batch may be NaN |
 /// | recursive | replaced first; filtered once | filtered once; state 0, [counted](Self::state_resets) |
 ///
 /// The search for what is not finite passes over the input at most three times.
@@ -92,19 +92,15 @@ impl Stream {
     ///
     /// # Errors
     /// [`ProcessError`] if the slices do not fit; nothing is processed then.
-    pub fn process<S: Sample>(&mut self, input: &[S], output: &mut [S]) -> Result<usize, ProcessError> {
-        self.run(&Interleaved::new(input, self.channels())?, output)
+    pub fn process<S: Sample>(&mut self, input: &[S], mut output: &mut [S]) -> Result<usize, ProcessError> {
+        self.run(&Interleaved::new(input, self.channels())?, &mut output)
     }
 
     /// As [`Stream::process`], from any input and to any output.
     ///
     /// # Errors
     /// As [`Stream::process`].
-    pub fn run(
-        &mut self,
-        input: &(impl Input + ?Sized),
-        output: &mut (impl Output + ?Sized),
-    ) -> Result<usize, ProcessError> {
+    pub fn run(&mut self, input: &dyn Input, output: &mut dyn Output) -> Result<usize, ProcessError> {
         let frames = self.check(input, output)?;
         self.replaced += match self.plan.offsets() {
             Some(offsets) => self.engine.process(&WithoutOffsets { input, offsets }, output),
@@ -124,8 +120,8 @@ impl Stream {
     #[cfg(feature = "rayon")]
     pub fn run_parallel(
         &mut self,
-        input: &(impl Input + Sync + ?Sized),
-        output: &mut (impl SplitOutput + ?Sized),
+        input: &dyn Input,
+        output: &mut dyn SplitOutput,
         pool: &crate::ThreadPool,
     ) -> Result<usize, ProcessError> {
         let frames = self.check(input, output)?;
@@ -142,7 +138,7 @@ impl Stream {
     ///
     /// # Errors
     /// [`ProcessError::OutputTooShort`]; nothing is processed then.
-    pub fn flush(&mut self, output: &mut (impl Output + ?Sized)) -> Result<usize, ProcessError> {
+    pub fn flush(&mut self, output: &mut dyn Output) -> Result<usize, ProcessError> {
         let zeros = Zeros { channels: self.channels(), frames: self.plan.flush_frames() };
         let frames = self.check(&zeros, output)?;
         // Zeros without offsets: what no converter delivered.
@@ -226,11 +222,7 @@ impl Stream {
     }
 
     /// The frames of a call, if everything fits.
-    fn check(
-        &self,
-        input: &(impl Input + ?Sized),
-        output: &(impl Output + ?Sized),
-    ) -> Result<usize, ProcessError> {
+    fn check(&self, input: &dyn Input, output: &dyn Output) -> Result<usize, ProcessError> {
         if input.channels() != self.channels() {
             return Err(ProcessError::Channels { given: input.channels(), wanted: self.channels() });
         }

@@ -27,7 +27,7 @@ fn plans() -> Vec<Plan> {
 
 fn plans_of(channels: usize, precision: Precision) -> Vec<Plan> {
     let options = |algorithm| Options { algorithm, precision, ..Options::default() };
-    let fir = [Algorithm::Direct, Algorithm::OverlapSave { transform: Some(64) }];
+    let fir = [Algorithm::Direct, Algorithm::OverlapSave];
     let taps = vec![vec![0.25; 20 * M]; channels];
     let by = |algorithm| Plan::from_taps(&taps, M, 4, options(algorithm)).unwrap();
     // Two states side by side, which run as a section, and five that all depend on one another.
@@ -52,12 +52,7 @@ fn quiet<R>(plan: &Plan, form: &str, call: impl FnOnce() -> R) -> R {
 }
 
 /// An input and an output through [`Stream::run`].
-fn quiet_run(
-    stream: &mut Stream,
-    form: &str,
-    input: &(impl Input + ?Sized),
-    output: &mut (impl Output + ?Sized),
-) {
+fn quiet_run(stream: &mut Stream, form: &str, input: &dyn Input, output: &mut dyn Output) {
     let plan = stream.plan().clone();
     let wanted = input.frames() * M;
     assert_eq!(quiet(&plan, form, || stream.run(input, output)), Ok(wanted), "{form}");
@@ -86,14 +81,14 @@ fn samples_in_memory() {
             quiet(&plan, "f32", || stream.process(single, &mut out)).unwrap();
             quiet(&plan, "f64", || stream.process(double, &mut wide)).unwrap();
             let channels = vec![&single[..frames]; n];
-            quiet_run(&mut stream, "planar f32", &Planar::new(&channels).unwrap(), &mut out[..]);
+            quiet_run(&mut stream, "planar f32", &Planar::new(&channels).unwrap(), &mut out.as_mut_slice());
             let channels = vec![&double[..frames]; n];
-            quiet_run(&mut stream, "planar f64", &Planar::new(&channels).unwrap(), &mut wide[..]);
+            quiet_run(&mut stream, "planar f64", &Planar::new(&channels).unwrap(), &mut wide.as_mut_slice());
             let input = Interleaved::new(single, n).unwrap();
-            quiet_run(&mut stream, "f32 to f64", &input, &mut wide[..]);
+            quiet_run(&mut stream, "f32 to f64", &input, &mut wide.as_mut_slice());
             let input = Planar::new(&channels).unwrap();
-            quiet_run(&mut stream, "planar f64 to f32", &input, &mut out[..]);
-            quiet_run(&mut stream, "zeros", &Zeros { channels: n, frames }, &mut out[..]);
+            quiet_run(&mut stream, "planar f64 to f32", &input, &mut out.as_mut_slice());
+            quiet_run(&mut stream, "zeros", &Zeros { channels: n, frames }, &mut out.as_mut_slice());
         }
     }
 }
@@ -118,7 +113,7 @@ fn samples_as_they_lie_in_files() {
                 let recordings = vec![PcmFrames { layout, channels, bytes }; n / channels];
                 let mut output = PcmOutput::packed(to, &mut out);
                 let form = format!("{from} to {to}");
-                let written = quiet(&plan, &form, || stream.run(&recordings[..], &mut output));
+                let written = quiet(&plan, &form, || stream.run(&recordings.as_slice(), &mut output));
                 assert_eq!(written, Ok(frames * M));
             }
         }
@@ -133,7 +128,7 @@ fn flush_reset_and_calls_that_are_refused() {
         let samples = plan.flush_frames() * M;
         assert!(samples > 0);
         let (mut out, mut bytes) = (vec![0f32; samples], vec![0; 2 * samples]);
-        assert_eq!(quiet(&plan, "flush", || stream.flush(&mut out[..])), Ok(samples));
+        assert_eq!(quiet(&plan, "flush", || stream.flush(&mut out.as_mut_slice())), Ok(samples));
         let mut pcm = PcmOutput::packed(PcmFormat::S16Le, &mut bytes);
         assert_eq!(quiet(&plan, "flush to PCM", || stream.flush(&mut pcm)), Ok(samples));
         quiet(&plan, "no frames", || stream.process::<f32>(&[], &mut out)).unwrap();

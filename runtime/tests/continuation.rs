@@ -64,7 +64,7 @@ fn what_cannot_go_on_is_refused() {
     let direct = plan(4, 1, Algorithm::Direct, Precision::Single);
     let wider = Plan::from_taps(&vec![vec![1.0; 4]; N + 1], M, 0, Options::default()).unwrap();
     let double = plan(4, 1, Algorithm::Direct, Precision::Double);
-    let overlap = plan(20, 1, Algorithm::OverlapSave { transform: None }, Precision::Single);
+    let overlap = plan(20, 1, Algorithm::OverlapSave, Precision::Single);
     let system = StateSpace {
         a: vec![vec![0.5]],
         b: vec![vec![1.0; N]],
@@ -103,7 +103,7 @@ fn complex_samples_are_two_streams_of_one_plan() {
         (Algorithm::Direct, PcmFormat::S16Le, 2),
         (Algorithm::Direct, PcmFormat::F32Le, 4),
         (Algorithm::Direct, PcmFormat::S24Le, 4),
-        (Algorithm::OverlapSave { transform: Some(64) }, PcmFormat::F64Be, 8),
+        (Algorithm::OverlapSave, PcmFormat::F64Be, 8),
     ] {
         let plan = plan(9, 1, algorithm, Precision::Single);
         let layout = SampleLayout { format, container };
@@ -119,12 +119,12 @@ fn complex_samples_are_two_streams_of_one_plan() {
             let alone = PcmFrames { layout, channels: N, bytes: &bytes };
             let mut want = vec![0; FRAMES * M * format.bytes()];
             let mut wanted = PcmOutput::packed(format, &mut want);
-            let written = Stream::new(&plan).run(&[alone][..], &mut wanted);
+            let written = Stream::new(&plan).run(&[alone].as_slice(), &mut wanted);
             assert_eq!(written, Ok(FRAMES * M));
 
             assert_eq!(input.part(part).frames(), FRAMES);
             output.select(part);
-            assert_eq!(Stream::new(&plan).run(&[input.part(part)][..], &mut output), written);
+            assert_eq!(Stream::new(&plan).run(&[input.part(part)].as_slice(), &mut output), written);
             clipped += wanted.clipped;
             assert_eq!(output.clipped, clipped);
             let words = output.bytes.chunks_exact(format.bytes()).skip(part).step_by(2);

@@ -1,6 +1,6 @@
 //! Packed floats of this machine's byte order are read and written where they lie; all others are converted.
 
-use hybank_runtime::{Input, Isa, Output, PcmFormat, PcmFrames, PcmOutput, Precision, Sample, SampleLayout};
+use hybank_runtime::{Input, Isa, Output, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout};
 
 const NATIVE: PcmFormat = PcmFormat::F32Le.native();
 const FOREIGN: PcmFormat = if cfg!(target_endian = "big") { PcmFormat::F32Le } else { PcmFormat::F32Be };
@@ -9,9 +9,9 @@ fn frames(format: PcmFormat, channels: usize, bytes: &[u8]) -> [PcmFrames<'_>; 1
     [PcmFrames { layout: SampleLayout::packed(format), channels, bytes }]
 }
 
-fn loaded<T: Sample>(frames: &[PcmFrames<'_>]) -> Vec<T> {
-    let mut samples = vec![T::default(); frames.frames() * frames.channels()];
-    frames.load(Isa::detect(), 0, &mut samples);
+fn loaded(frames: &[PcmFrames<'_>]) -> Vec<f32> {
+    let mut samples = vec![0.0; frames.frames() * frames.channels()];
+    frames.load_f32(Isa::detect(), 0, &mut samples);
     samples
 }
 
@@ -21,17 +21,17 @@ fn frames_are_read_where_they_lie() {
     let bytes: &[u8] = bytemuck::cast_slice(&numbers);
     let whole = frames(NATIVE, 2, bytes);
     // The last sample is no frame.
-    assert_eq!(whole[..].in_memory::<f32>().unwrap(), &numbers[..4]);
-    assert_eq!(whole[..].in_memory::<f32>().unwrap().as_ptr(), numbers.as_ptr());
-    assert_eq!(whole[..].in_memory::<f32>().unwrap(), loaded::<f32>(&whole));
+    assert_eq!(whole.as_slice().in_memory_f32().unwrap(), &numbers[..4]);
+    assert_eq!(whole.as_slice().in_memory_f32().unwrap().as_ptr(), numbers.as_ptr());
+    assert_eq!(whole.as_slice().in_memory_f32().unwrap(), loaded(&whole));
     for apart in
         [frames(FOREIGN, 2, bytes), frames(NATIVE, 2, &bytes[1..]), frames(PcmFormat::S16Le, 2, bytes)]
     {
-        assert!(apart[..].in_memory::<f32>().is_none());
+        assert!(apart.as_slice().in_memory_f32().is_none());
     }
-    assert!(whole[..].in_memory::<f64>().is_none());
-    assert!([whole[0], whole[0]][..].in_memory::<f32>().is_none());
-    assert!([whole[0].part(1)][..].in_memory::<f32>().is_none());
+    assert!(whole.as_slice().in_memory_f64().is_none());
+    assert!([whole[0], whole[0]].as_slice().in_memory_f32().is_none());
+    assert!([whole[0].part(1)].as_slice().in_memory_f32().is_none());
 }
 
 #[test]
@@ -39,17 +39,17 @@ fn samples_are_written_where_they_lie() {
     let mut numbers = [0.0f64; 4];
     let native = PcmFormat::F64Le.native();
     let mut output = PcmOutput::packed(native, bytemuck::cast_slice_mut(&mut numbers));
-    assert!(output.slots::<f32>(0..1).is_none());
-    output.slots::<f64>(1..3).unwrap().copy_from_slice(&[0.5, -2.0]);
-    output.store(Isa::detect(), 3, &[7.0f64]);
+    assert!(output.slots_f32(0..1).is_none());
+    output.slots_f64(1..3).unwrap().copy_from_slice(&[0.5, -2.0]);
+    output.store_f64(Isa::detect(), 3, &[7.0]);
     output.select(1);
-    assert!(output.slots::<f64>(0..1).is_none());
+    assert!(output.slots_f64(0..1).is_none());
     assert_eq!(numbers, [0.0, 0.5, -2.0, 7.0]);
     let mut empty = PcmOutput::packed(native, &mut []);
     empty.select(1);
-    assert!(empty.slots::<f64>(0..0).is_none());
+    assert!(empty.slots_f64(0..0).is_none());
     let mut bytes = [0u8; 9];
-    assert!(PcmOutput::packed(PcmFormat::S16Le, &mut bytes).slots::<f32>(0..1).is_none());
+    assert!(PcmOutput::packed(PcmFormat::S16Le, &mut bytes).slots_f32(0..1).is_none());
 }
 
 #[test]

@@ -46,10 +46,9 @@ fn recursion(channels: usize, order: usize) -> Plan {
 
 /// Every algorithm in both precisions, with K odd and even, with and without offsets.
 fn plans() -> Vec<Plan> {
-    let overlap_save = Algorithm::OverlapSave { transform: Some(32) };
     let mut plans = Vec::new();
     for precision in [Precision::Single, Precision::Double] {
-        for algorithm in [Algorithm::Direct, overlap_save] {
+        for algorithm in [Algorithm::Direct, Algorithm::OverlapSave] {
             plans.extend([(1, 2), (2, 9), (3, 10)].map(|(n, k)| fir(n, k, algorithm, precision)));
         }
     }

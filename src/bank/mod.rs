@@ -20,8 +20,6 @@ pub use digest::check_digest;
 pub use error::{BankError, BankProblem};
 pub use proof::{BoxProof, Certificate, GainWitness, NormBound, Proof};
 pub use taps::FixedPoint;
-#[cfg(feature = "design")]
-pub(crate) use taps::signed_digits;
 
 pub use crate::runtime::StateSpace;
 pub use crate::spec::{FrameLayout, FrameSample};
@@ -86,9 +84,8 @@ pub enum SynthesisFilters {
 #[serde(deny_unknown_fields)]
 pub struct Gamma {
     /// Norm computed from the coefficients of this bank. Its relative error is at most
-    /// [`NORM_ACCURACY`](Self::NORM_ACCURACY), below [`TINY_NORM`](Self::TINY_NORM) at most
-    /// [`TINY_NORM_ACCURACY`](Self::TINY_NORM_ACCURACY), and rounding in the products of filters and front
-    /// ends adds an absolute one.
+    /// [`NORM_ACCURACY`](Self::NORM_ACCURACY), or more where the error is a small difference of the target
+    /// and what the filters make of the samples: `upper` states it.
     pub norm: Option<f64>,
     /// An upper bound of the true norm of these coefficients: proven if the bank carries a proof, else the
     /// computed norm plus its stated error.
@@ -104,22 +101,15 @@ pub struct Gamma {
 }
 
 impl Gamma {
-    /// Relative error of a computed norm of at least [`TINY_NORM`](Self::TINY_NORM).
+    /// Relative error of a computed norm that is no small difference.
     pub const NORM_ACCURACY: f64 = 1e-9;
-    /// Norms below this are computed with less accuracy.
-    pub const TINY_NORM: f64 = 1e-9;
-    /// Relative error of a computed norm below [`TINY_NORM`](Self::TINY_NORM). The largest one observed is
-    /// 7 %.
-    pub const TINY_NORM_ACCURACY: f64 = 0.1;
 
-    /// The bounds of a bank with the computed `norm`, whose absolute error from rounding is `rounding`. No
-    /// lower bound exceeds the upper bound.
-    pub fn computed(norm: f64, rounding: f64, lower: f64, noncausal: f64) -> Self {
-        let accuracy = if norm < Self::TINY_NORM { Self::TINY_NORM_ACCURACY } else { Self::NORM_ACCURACY };
-        let upper = norm * (1.0 + accuracy) + rounding;
+    /// The bounds of a bank with the computed `norm`, whose absolute error is at most `error`. No lower bound
+    /// exceeds the upper bound.
+    pub fn computed(norm: f64, error: f64, lower: f64, noncausal: f64) -> Self {
         Self {
             norm: Some(norm),
-            upper: Some(upper),
+            upper: Some(norm + error),
             lower: Some(lower.min(norm)),
             noncausal: Some(noncausal.min(norm)),
             worst_case: None,
@@ -169,7 +159,6 @@ impl Bank {
         }
         if let Some(words) = self.fixed_point.as_ref().filter(|_| spec.design.loss_db.is_some()) {
             (spec.design.bits, spec.design.loss_db) = (Some(words.bits.clone()), None);
-            spec.design.digits = false;
         }
         Some(spec)
     }
@@ -259,18 +248,6 @@ impl Bank {
             ),
         };
         plan?.with_offsets(&self.layout().each(&self.offsets))
-    }
-
-    /// Bytes of memory that the plan of an FIR bank and so many of its streams take, about; 0 for recursive
-    /// banks.
-    ///
-    /// # Errors
-    /// As [`Bank::plan`].
-    pub fn plan_bytes(&self, options: Options, streams: usize) -> Result<f64, BuildError> {
-        match &self.filters {
-            SynthesisFilters::Fir(taps) => Plan::bytes_of_taps(taps, self.ratio, options, streams),
-            SynthesisFilters::StateSpace(_) => Ok(0.0),
-        }
     }
 }
 

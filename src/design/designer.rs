@@ -1,7 +1,6 @@
 //! The steps from a spec to a finished bank.
 
-use super::effort;
-use super::limits::{Effort, Limits, Stage, Stop};
+use super::limits::{Stage, Stop, TIME_LIMIT, remedy};
 use super::merging::Repeats;
 use super::methods::robust_fir::RobustStudy;
 use super::methods::{self, Settings, Synthesis};
@@ -11,7 +10,6 @@ use super::quantise::WordStudy;
 use super::realise::{Realised, realise};
 use super::reduction::OrderReduction;
 use super::sizing::{Comparison, Sizing, settings};
-use super::unfinished::Unfinished;
 use super::{DesignError, filters, prove};
 use crate::analog::SignalFilter;
 use crate::bank::{Bank, Gamma, SynthesisFilters};
@@ -29,9 +27,6 @@ pub struct Design {
     pub sizing: Sizing,
     /// Frequency of the worst case.
     pub peak_frequency: RadiansPerSlowPeriod,
-    /// What the search for the least gamma, or for the least mean square beside it, left open; `None` also
-    /// for methods that do not minimise gamma and for a gamma of zero up to rounding.
-    pub unfinished: Option<Unfinished>,
     /// Number of Riccati equations solved, or of interior-point iterations.
     pub iterations: usize,
     /// For integer taps, the increase of the error that they cause.
@@ -63,19 +58,19 @@ pub enum ProofSearch {
 pub struct Options<'a> {
     /// Whether a proof is searched.
     pub proof: ProofSearch,
-    /// Whether a design that takes too long or needs too much memory is refused, or ended when it has.
-    pub limits: Limits,
-    /// Called with the step that begins and the estimate of the whole design.
-    pub observer: &'a dyn Fn(Stage, Effort),
+    /// The time after which the design ends with what it has.
+    pub time_limit: Option<Duration>,
+    /// Called with the step that begins.
+    pub observer: &'a dyn Fn(Stage),
     /// Ends the design.
     pub stop: Stop,
 }
 
 impl Default for Options<'_> {
-    /// With the search for a proof, limited and unobserved.
+    /// With the search for a proof, limited to [`TIME_LIMIT`] and unobserved.
     fn default() -> Self {
-        let (proof, limits, stop) = (ProofSearch::Run, Limits::Enforced, Stop::default());
-        Self { proof, limits, observer: &|_, _| (), stop }
+        let (proof, time_limit, stop) = (ProofSearch::Run, Some(TIME_LIMIT), Stop::default());
+        Self { proof, time_limit, observer: &|_| (), stop }
     }
 }
 
@@ -95,13 +90,13 @@ impl Options<'_> {
 ///
 /// # Errors
 /// [`DesignError`] if the spec breaks a rule of [`Spec::check`], a filter of the spec is not a valid front
-/// end, a comparison method does not apply, the design would take longer than its limit or more memory than
-/// there is, no bank was found for numerical reasons, or the design was ended before there was one:
-/// [`DesignError::StoppedWithoutBank`]. A bank without a proof is not an error: see [`Design::proof`].
+/// end, a comparison method does not apply, no bank was found for numerical reasons, or the design was ended
+/// before there was one: [`DesignError::StoppedWithoutBank`]. A bank without a proof is not an error: see
+/// [`Design::proof`].
 pub fn design(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     spec.check()?;
     designed(&filled_in(spec), options).map_err(|error| match error {
-        DesignError::Stopped => DesignError::StoppedWithoutBank { remedy: effort::remedy(spec) },
+        DesignError::Stopped => DesignError::StoppedWithoutBank { remedy: remedy(spec) },
         other => other,
     })
 }
@@ -116,13 +111,12 @@ fn filled_in(spec: &Spec) -> Spec {
 }
 
 fn designed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
-    let stop = options.stop.within(options.limits);
+    let stop = options.stop.within(options.time_limit);
     let problem = Problem::before_sizing(spec)?;
-    let effort = effort::check(spec, options.proof == ProofSearch::Run, options.limits)?;
-    let observer = |designs| (options.observer)(Stage::Latency { designs }, effort);
+    let observer = |designs| (options.observer)(Stage::Latency { designs });
     let sizing = Sizing::new(spec, &problem, Comparison { observer: &observer, stop: &stop })?;
     let problem = Problem { latency: sizing.latency, ..problem };
-    (options.observer)(Stage::Filters, effort);
+    (options.observer)(Stage::Filters);
     let settings = Settings { stop: stop.clone(), ..settings(spec, sizing.taps)? };
     let merged = if settings.robust.is_some() || settings.deviations.is_some() {
         problem.merge_channels(Repeats::Never)
@@ -131,13 +125,13 @@ fn designed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     };
     let plant = LiftedPlant::new(&merged.problem);
     let synthesis = methods::synthesise(spec.design.method, &plant, &settings)?;
-    (options.observer)(Stage::Realisation, effort);
+    (options.observer)(Stage::Realisation);
     let realised = realise(spec, &problem, &merged, &plant, &synthesis, &stop)?;
     let judged = judge(spec, sizing, realised, &synthesis).without_unresolved_bounds(&problem);
     if stop.is_due() {
         return Ok(Design { proof: Err(DesignError::Stopped), ..judged });
     }
-    (options.observer)(Stage::Proof, effort);
+    (options.observer)(Stage::Proof);
     Ok(judged.proved(options.proof, &stop))
 }
 
@@ -162,8 +156,8 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
     let plant = LiftedPlant::new(&problem);
     let synthesis = Synthesis::of_taps(&plant, taps.clone())?;
     let filters = SynthesisFilters::Fir(taps);
-    let rounding = plant.rounding(&filters::lifted(&filters, problem.ratio))?;
-    let realised = Realised { filters, peak: synthesis.peak, rounding, reduction: None, integers: None };
+    let norm_error = plant.norm_error(synthesis.peak.gain, &filters::lifted(&filters, problem.ratio))?;
+    let realised = Realised { filters, peak: synthesis.peak, norm_error, reduction: None, integers: None };
     let sizing = Sizing { latency, taps: length, latency_chosen: false, taps_chosen: false };
     let judged = judge(&complete, sizing, realised, &synthesis).without_unresolved_bounds(&problem);
     Ok(judged.proved(search, &Stop::default()))
@@ -171,7 +165,7 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
 
 /// The bank with the norm of its final coefficients. No lower bound exceeds that norm.
 fn judge(spec: &Spec, sizing: Sizing, realised: Realised, synthesis: &Synthesis) -> Design {
-    let Realised { filters, peak, rounding, reduction, integers } = realised;
+    let Realised { filters, peak, norm_error, reduction, integers } = realised;
     let (fixed_point, words) = integers.unzip();
     let bank = Bank {
         fast_period: spec.fast_period,
@@ -183,7 +177,7 @@ fn judge(spec: &Spec, sizing: Sizing, realised: Realised, synthesis: &Synthesis)
         gains: spec.channels.iter().map(|channel| channel.gain).collect(),
         offsets: spec.channels.iter().map(|channel| channel.offset).collect(),
         filters,
-        gamma: Gamma::computed(peak.gain, rounding, synthesis.lower, synthesis.noncausal),
+        gamma: Gamma::computed(peak.gain, norm_error, synthesis.lower, synthesis.noncausal),
         proof: None,
         fixed_point,
         spec: Some(spec.clone()),
@@ -191,7 +185,6 @@ fn judge(spec: &Spec, sizing: Sizing, realised: Realised, synthesis: &Synthesis)
     Design {
         sizing,
         peak_frequency: RadiansPerSlowPeriod(peak.frequency),
-        unfinished: synthesis.unfinished.filter(|_| synthesis.peak.gain > rounding),
         iterations: synthesis.iterations,
         words,
         reduction,
@@ -220,10 +213,6 @@ impl Design {
             if self.proof.is_ok() {
                 // `verify` proves it only with the rest.
                 self.prove_worst_case(stop);
-            }
-            if self.unfinished.is_some() && self.robust.is_none() && prove::has_no_error(&self.bank) {
-                // A bank without any error leaves nothing open.
-                self.unfinished = None;
             }
             self.proof_time = begin.elapsed();
         }

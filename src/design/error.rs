@@ -1,8 +1,6 @@
 //! Errors of design and analysis.
 
-use super::limits::{
-    Effort, MAX_LONG_STATES, MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, memory_text, time_text,
-};
+use super::limits::{MAX_LONG_STATES, MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS};
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
 use crate::lti::LtiError;
@@ -11,7 +9,6 @@ use crate::sampling::SamplingError;
 use crate::spec::{SpecError, WordLengths};
 use crate::units::FastPeriods;
 use crate::verify::VerifyError;
-use std::time::Duration;
 
 /// Why a bank could not be designed or analysed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -190,29 +187,6 @@ pub enum DesignError {
         best: f64,
         /// The longest of them.
         taps: usize,
-    },
-    /// The design would take longer than its limit.
-    #[error("this design would take about {effort}, and {} are allowed: {remedy}", time_text(*.limit))]
-    TooLong {
-        /// The estimate.
-        effort: Effort,
-        /// The time that it may take.
-        limit: Duration,
-        /// The way out.
-        remedy: &'static str,
-    },
-    /// The design would need more memory than there is.
-    #[error(
-        "this design would take about {effort}, and this process may use {}: {remedy}",
-        memory_text(*.memory)
-    )]
-    TooLarge {
-        /// The estimate.
-        effort: Effort,
-        /// Bytes of memory.
-        memory: f64,
-        /// The way out.
-        remedy: &'static str,
     },
     /// No tap sees a sample that has to do with the reference.
     #[error(

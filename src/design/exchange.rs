@@ -23,7 +23,6 @@
 use super::DesignError;
 use super::error_grid::{AffineError, Location, Peaks};
 use super::limits::Stop;
-use super::unfinished::{EndOfSearch, Unfinished};
 use crate::linalg;
 use crate::lmi::sampled::{self, Covered, LowerBound, MeanSquareObjective, Point, Problem, Taps};
 use crate::lmi::{FINEST_GAP, Outcome};
@@ -115,9 +114,6 @@ pub(super) struct Exchange<E: AffineError> {
     pub(super) lower_for_all: f64,
     /// Ends the exchange with the best unknowns so far.
     pub(super) stop: Stop,
-    /// What the last search for the least gamma left open, or that for the least mean square after it,
-    /// unless it was stopped.
-    pub(super) unfinished: Option<Unfinished>,
     /// Problems solved.
     pub(super) rounds: usize,
     /// Interior-point iterations of all rounds.
@@ -149,7 +145,6 @@ impl<E: AffineError> Exchange<E> {
             lower: 0.0,
             lower_for_all: 0.0,
             stop: Stop::default(),
-            unfinished: None,
             rounds: 0,
             iterations: 0,
         }
@@ -191,14 +186,6 @@ impl<E: AffineError> Exchange<E> {
         self.minimise_mean_square(least, tolerances)
     }
 
-    /// What is left open by taps of the norm `gamma`, which `is_missed` if the peaks do not explain it.
-    pub(super) fn unfinished_at(&self, gamma: f64, is_missed: bool, accuracy: f64) -> Option<Unfinished> {
-        if !is_missed || self.stop.is_due() {
-            return self.unfinished;
-        }
-        Unfinished::of(self.lower, gamma, accuracy, EndOfSearch::MissedPeaks)
-    }
-
     /// Adds points at the given locations, except where there is one. Returns whether any was added.
     pub(super) fn add(&mut self, locations: &[Location<E::Scenario>]) -> bool {
         let known = self.locations.len();
@@ -218,7 +205,6 @@ impl<E: AffineError> Exchange<E> {
         let mut tolerance = tolerances.tolerance(f64::INFINITY);
         let mut last = self.round(tolerances, tolerance)?;
         let mut best = last.candidate.clone();
-        let mut reason = EndOfSearch::Rounds;
         for _ in 1..tolerances.rounds {
             let gamma = best.peaks.estimate;
             if gamma <= self.lower * (1.0 + tolerances.accuracy) || self.stop.is_due() {
@@ -228,7 +214,6 @@ impl<E: AffineError> Exchange<E> {
             // it cannot be, that is the end.
             let added = self.add(&last.above);
             if !added && (last.outcome != Outcome::Solved || tolerance <= tolerances.finest()) {
-                reason = EndOfSearch::of(last.outcome);
                 break;
             }
             tolerance = tolerances.tolerance(if added { gamma / self.lower - 1.0 } else { 0.0 });
@@ -238,11 +223,6 @@ impl<E: AffineError> Exchange<E> {
                 best = last.candidate.clone();
             }
         }
-        self.unfinished = if self.stop.is_due() {
-            None
-        } else {
-            Unfinished::of(self.lower, best.peaks.estimate, tolerances.accuracy, reason)
-        };
         Ok(best)
     }
 
@@ -291,7 +271,6 @@ impl<E: AffineError> Exchange<E> {
     ) -> Result<Candidate<E::Scenario>, DesignError> {
         let cap = start.peaks.estimate * (1.0 + self.gamma_margin);
         let cap_at_points = start.peaks.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
-        let mut left = None;
         for _ in 0..tolerances.rounds {
             if self.stop.is_due() {
                 return Ok(start);
@@ -307,23 +286,14 @@ impl<E: AffineError> Exchange<E> {
             // Gamma may be zero up to rounding: no cap lies above it then, and no other unknowns are better.
             let Some(found) = found else { return Ok(start) };
             self.count_round(found.iterations);
-            let (lower, square) = (found.lower, found.mean_square);
             let candidate = self.judge(found.taps, found.gamma, cap_at_points)?;
             if candidate.peaks.estimate <= cap {
-                let reason = EndOfSearch::of(found.outcome);
-                let left = Unfinished::of_mean_square(lower, square, reason);
-                self.unfinished = self.unfinished.or(left);
                 return Ok(candidate);
             }
-            let of_start = self.problem.mean_square(&start.taps, &self.objective);
-            let unfinished = |reason| Unfinished::of_mean_square(lower, of_start, reason);
-            left = unfinished(EndOfSearch::Rounds);
             if !self.add(&candidate.peaks.above(cap_at_points)) {
-                left = unfinished(EndOfSearch::MissedPeaks);
                 break;
             }
         }
-        self.unfinished = self.unfinished.or(left);
         Ok(start)
     }
 

@@ -4,7 +4,6 @@
 pub mod analysis;
 pub(crate) mod covariances;
 mod designer;
-pub mod effort;
 mod error;
 mod error_grid;
 mod exchange;
@@ -25,7 +24,6 @@ mod reduction;
 pub mod responses;
 mod sizing;
 pub mod uncertainty;
-mod unfinished;
 mod warnings;
 
 pub use analysis::{
@@ -33,9 +31,8 @@ pub use analysis::{
 };
 pub(crate) use analysis::{NearestSample, nearest_samples};
 pub use designer::{Design, Options, ProofSearch, design, judge_taps};
-pub use effort::remedy;
 pub use error::DesignError;
-pub use limits::{Effort, Limits, Stage, Stop, TIME_LIMIT};
+pub use limits::{Stage, Stop, TIME_LIMIT, remedy};
 pub use methods::robust_fir::RobustNorms;
 pub use methods::robust_fir::RobustStudy;
 pub use plant::LiftedPlant;
@@ -44,7 +41,6 @@ pub use prove::{Certified, certify};
 pub use reduction::{OrderErrorPoint, OrderReduction};
 pub use responses::error_response;
 pub use sizing::Sizing;
-pub use unfinished::{EndOfSearch, Objective, Unfinished};
 pub use warnings::warnings;
 
 use crate::bank::{Bank, Proof};

@@ -23,8 +23,8 @@ pub(super) struct Realised {
     pub(super) filters: SynthesisFilters,
     /// The norm of the error system of the final coefficients.
     pub(super) peak: Peak,
-    /// The absolute error of `peak.gain` from rounding.
-    pub(super) rounding: f64,
+    /// The absolute error that `peak.gain` may have.
+    pub(super) norm_error: f64,
     pub(super) reduction: Option<OrderReduction>,
     pub(super) integers: Option<(FixedPoint, WordStudy)>,
 }
@@ -32,7 +32,7 @@ pub(super) struct Realised {
 impl Realised {
     /// Filters of which only the norm of the error system is known.
     fn of(filters: SynthesisFilters, peak: Peak) -> Self {
-        Self { filters, peak, rounding: 0.0, reduction: None, integers: None }
+        Self { filters, peak, norm_error: 0.0, reduction: None, integers: None }
     }
 }
 
@@ -55,8 +55,9 @@ pub(super) fn realise(
         Filters::Fir(taps) => realisation.with_integers(realisation.fir(taps, synthesis.peak)?),
         Filters::StateSpace(system) => realisation.state_space(system, synthesis.peak.gain),
     }?;
-    let rounding = whole.rounding(&filters::lifted(&realised.filters, spec.ratio))?;
-    Ok(Realised { rounding, ..realised })
+    let lifted = filters::lifted(&realised.filters, spec.ratio);
+    let norm_error = whole.norm_error(realised.peak.gain, &lifted)?;
+    Ok(Realised { norm_error, ..realised })
 }
 
 struct Realisation<'a> {
@@ -93,7 +94,7 @@ impl Realisation<'_> {
         let (integers, study) = match (&design.bits, design.loss_db) {
             (bits, Some(loss_db)) => {
                 let most = bits.clone().unwrap_or(WordLengths::Same(MAX_BITS));
-                quantise_within(problem, gamma, &Allowance { loss_db, most, by_digits: design.digits })?
+                quantise_within(problem, gamma, &Allowance { loss_db, most })?
             }
             (Some(bits), None) => quantise(problem, gamma, bits, design.fraction_bits)?,
             (None, None) => return Ok(real),
@@ -119,7 +120,6 @@ impl Realisation<'_> {
             plant: &LiftedPlant::new(&distinct.problem),
             bank: &system.map_inputs(&self.merged.shares_of(&distinct)),
             order: block.a.len(),
-            width: self.whole.channels(),
             aim: if self.spec.design.method == Method::H2 { Aim::MeanSquare } else { Aim::WorstCase },
             gamma_margin: self.spec.design.gamma_margin.unwrap_or(0.0),
             stop: self.stop,
@@ -129,18 +129,10 @@ impl Realisation<'_> {
             None => full,
             Some(smaller) => {
                 let whole = smaller.map_inputs(&distinct.shares());
-                self.reduced_realisation(&whole, record.reduced.figures.gamma)?
+                self.fastest_realisation(&whole, record.reduced.figures.gamma)?
             }
         };
         Ok(Realised { reduction: Some(record), ..evaluated })
-    }
-
-    /// A reduced bank for all channels, in a fast realisation if one keeps the norm `promised`.
-    fn reduced_realisation(&self, reduced: &FirWithTail, promised: f64) -> Result<Realised, DesignError> {
-        match self.fast_realisation(reduced, promised)? {
-            Some(found) => Ok(found),
-            None => evaluate(self.whole, block_filters(&reduced.realise())),
-        }
     }
 
     /// The filters in the cheapest realisation that keeps the norm `promised`: an FIR head followed by

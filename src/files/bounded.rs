@@ -1,7 +1,6 @@
 //! Reads whole files up to a maximum size. A device, for example, never ends.
 
 use super::FileError;
-use crate::memory::check_memory;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -19,70 +18,7 @@ pub struct Bound {
 
 /// Specs and banks; the largest bank with its proof is smaller.
 pub const SPEC_OR_BANK: Bound =
-    Bound { bytes: 256 << 20, kind: "a spec or bank file", remedy: "give the file that was meant" };
-
-/// Bytes of memory that parsing takes for each byte of a text, and for what some of them begin or end.
-/// Measured for texts of one kind each: strings, numbers, keys, lists, tables, comments. Of these the sum is
-/// low by a quarter at most. It is high, up to five times, for tables without a key. The parser of TOML
-/// allocates 7 bytes for each byte first, whatever the text is.
-const JSON_BYTE: f64 = 4.0;
-const TOML_BYTE: f64 = 8.0;
-
-fn json_part(byte: u8) -> f64 {
-    match byte {
-        b',' => 60.0,
-        b':' => 100.0,
-        b'{' => 500.0,
-        b'[' => 300.0,
-        _ => 0.0,
-    }
-}
-
-/// The parser of TOML makes tokens first, of comments and spaces too.
-fn toml_part(before: u8, byte: u8, next: u8) -> f64 {
-    match byte {
-        b',' => 170.0,
-        b'=' => 160.0,
-        b'\n' => 50.0,
-        b'#' => 30.0,
-        b' ' | b'\t' if !matches!(next, b' ' | b'\t') => 100.0,
-        b'{' => 1100.0,
-        // The header of a table, or a list.
-        b'[' if before == b'\n' => 1250.0,
-        b'[' => 330.0,
-        _ => 0.0,
-    }
-}
-
-/// Of a dot between the parts of a key, `a.b`, each of which is a table.
-const DOTTED_BYTES: f64 = 1150.0;
-
-/// Bytes of memory that parsing a text takes, about: JSON if it begins as an object does, else TOML, whose
-/// parser takes more than those of lines and tables do.
-#[doc(hidden)]
-pub fn parsing_bytes(text: &[u8]) -> f64 {
-    if text.trim_ascii_start().starts_with(b"{") {
-        return text.iter().map(|&byte| JSON_BYTE + json_part(byte)).sum();
-    }
-    let (mut is_quoted, mut is_number) = (false, true);
-    let before = std::iter::once(&b'\n').chain(text);
-    let following = text.iter().skip(1).chain(b"\n");
-    let of = |((&before, &byte), &next): ((&u8, &u8), &u8)| {
-        match byte {
-            b'"' => is_quoted = !is_quoted,
-            b'\n' => is_quoted = false,
-            _ => {}
-        }
-        let is_key = byte == b'.' && !is_quoted && !(is_number && next.is_ascii_digit());
-        is_number = match byte {
-            b'.' => false,
-            b'0'..=b'9' | b'_' | b'+' | b'-' => is_number,
-            _ => !byte.is_ascii_alphabetic(),
-        };
-        TOML_BYTE + toml_part(before, byte, next) + if is_key { DOTTED_BYTES } else { 0.0 }
-    };
-    before.zip(text).zip(following).map(of).sum()
-}
+    Bound { bytes: 64 << 20, kind: "a spec or bank file", remedy: "give the file that was meant" };
 
 /// The bytes of a file.
 ///
@@ -120,10 +56,8 @@ pub fn bytes_of(stream: impl Read, name: &str, bound: Bound) -> Result<Vec<u8>, 
 /// The text that `bytes`, read from what is called `name`, hold.
 ///
 /// # Errors
-/// [`FileError::NotText`], and [`FileError::Memory`] if the process may not use what parsing it takes.
+/// [`FileError::NotText`].
 pub fn text_in(bytes: Vec<u8>, name: &str) -> Result<String, FileError> {
-    check_memory(parsing_bytes(&bytes))
-        .map_err(|shortage| FileError::Memory { file: name.to_owned(), shortage })?;
     String::from_utf8(bytes).map_err(|error| FileError::NotText {
         file: name.to_owned(),
         offset: error.utf8_error().valid_up_to(),
@@ -156,18 +90,6 @@ mod tests {
         let error = bytes_of(std::io::repeat(7), "endless", BOUND).unwrap_err().to_string();
         assert_eq!(error, "endless: longer than 4 bytes, the most that a test may have; write a shorter one");
         assert_eq!(bytes_of(&b"1234"[..], "fits", BOUND).unwrap(), b"1234");
-    }
-
-    /// Dots of numbers and of names of files make no tables.
-    #[test]
-    fn dots_between_parts_of_keys_are_tables() {
-        for line in ["a.b.c.d.e.f.g = 1\n", "a.1.2.3.4.5.6 = 1\n"] {
-            let bytes = parsing_bytes(line.as_bytes());
-            assert!((6.0 * DOTTED_BYTES..6.5 * DOTTED_BYTES).contains(&bytes), "{line}: {bytes}");
-        }
-        for other in ["delay = 0.125\n", "image = \"a.b.png\"\n", " [1.5e-3, -2.25]\n", "x = +1.5\n"] {
-            assert!(parsing_bytes(other.as_bytes()) < DOTTED_BYTES, "{other}");
-        }
     }
 
     #[test]

@@ -1,6 +1,5 @@
 //! Errors of reading and writing whole files.
 
-use crate::memory::MemoryShortage;
 use crate::messages::Quoted;
 use std::io;
 
@@ -32,41 +31,19 @@ pub enum FileError {
         /// What it is, and the remedy.
         what: &'static str,
     },
-    /// A device, pipe, socket or open descriptor, whose place no finished file can take.
-    #[error("{}: cannot replace it: it is {what}; give the name of a file", Quoted(.file))]
+    /// A device, pipe or socket, whose place no finished file can take.
+    #[error("{}: cannot replace it: it is a device, pipe or socket; give the name of a file", Quoted(.file))]
     Special {
         /// Name of the output.
         file: String,
-        /// What it is.
-        what: &'static str,
     },
-    /// The unfinished output is not the file that was begun under its hidden name.
-    #[error(
-        "{}: another program moved, removed or replaced its unfinished file {}; make sure that none does, and run it again",
-        Quoted(.file),
-        Quoted(.hidden)
-    )]
-    Replaced {
-        /// Name of the output.
-        file: String,
-        /// Hidden name of the unfinished file.
-        hidden: String,
-    },
-    /// All outputs are in place, and files that they replaced could not be removed.
-    #[error("the output is written; what it replaced is still there as {}: {source}; remove that", .hidden.join(" and "))]
-    OldFilesStay {
-        /// Hidden names of the files that had the names before, as text that may be printed.
-        hidden: Vec<String>,
-        /// What the system says of the first.
-        source: io::Error,
-    },
-    /// A set of outputs of which some could not be taken back.
-    #[error("{error}; already in place and not taken back: {}", .stay.join(" and "))]
+    /// A set of outputs of which some have their names and others get none.
+    #[error("{error}; already in place: {}", .named.join(" and "))]
     InPart {
         /// Why the set is not complete.
         error: Box<FileError>,
-        /// The outputs that stay, each whole, as text that may be printed.
-        stay: Vec<String>,
+        /// The outputs that are there, each whole, as text that may be printed.
+        named: Vec<String>,
     },
     /// An output is also an input.
     #[error("{}: it is also the input {}; give the output another name", Quoted(.output), Quoted(.input))]
@@ -95,14 +72,6 @@ pub enum FileError {
         kind: &'static str,
         /// What to do.
         remedy: &'static str,
-    },
-    /// The process may not use as much memory as reading takes.
-    #[error("{}: to read it takes {shortage}; allow more memory, or give the file that was meant", Quoted(.file))]
-    Memory {
-        /// Name of the file.
-        file: String,
-        /// What it takes and what there is.
-        shortage: MemoryShortage,
     },
     /// A text that is not UTF-8.
     #[error("{}: byte {offset} is not UTF-8, so this is no text file; give the file that was meant", Quoted(.file))]
@@ -135,8 +104,9 @@ impl FileError {
         move |source| Self::System { file, action, source }
     }
 
-    /// The same error of a set of which these outputs `stay`.
-    pub(super) fn beside(self, stay: Vec<String>) -> Self {
-        if stay.is_empty() { self } else { Self::InPart { error: Box::new(self), stay } }
+    /// The same error of a set of which these outputs have their names.
+    pub(super) fn after<'a>(self, named: impl Iterator<Item = &'a str>) -> Self {
+        let named: Vec<String> = named.map(|name| Quoted(name).to_string()).collect();
+        if named.is_empty() { self } else { Self::InPart { error: Box::new(self), named } }
     }
 }

@@ -2,7 +2,6 @@
 
 use super::FileError;
 use std::collections::HashMap;
-use std::fs::{self, File, Metadata};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -36,43 +35,6 @@ impl Identity {
         let name = path.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
         Ok(Self::Name(folder.canonicalize()?.join(name)))
     }
-}
-
-/// Which file was begun under a name, where the system tells.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Begun(Option<(u64, u64)>);
-
-impl Begun {
-    /// The open `file`.
-    pub(super) fn of(file: &File) -> Self {
-        Self(file.metadata().ok().and_then(|known| number(&known)))
-    }
-
-    /// The file, or link, that has the name now.
-    pub(super) fn at(path: &Path) -> Self {
-        Self(path.symlink_metadata().ok().and_then(|known| number(&known)))
-    }
-
-    /// Whether it still has this name: neither another file nor a link has taken it.
-    pub(super) fn is_at(self, path: &Path) -> bool {
-        self.0.is_none() || self == Self::at(path)
-    }
-
-    /// Removes it from `path`; what another program put there stays.
-    pub(super) fn remove(self, path: &Path) -> io::Result<()> {
-        if self.is_at(path) { fs::remove_file(path) } else { Ok(()) }
-    }
-}
-
-#[cfg(unix)]
-fn number(known: &Metadata) -> Option<(u64, u64)> {
-    use std::os::unix::fs::MetadataExt;
-    Some((known.dev(), known.ino()))
-}
-
-#[cfg(not(unix))]
-fn number(_: &Metadata) -> Option<(u64, u64)> {
-    None
 }
 
 /// True if both names lead to one file (the same device and inode), or to the same place where a file may

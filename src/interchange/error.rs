@@ -1,6 +1,5 @@
 //! Why a bank cannot be exported.
 
-use crate::memory::MemoryShortage;
 use crate::messages::Quoted;
 
 /// A format that cannot hold a bank.
@@ -23,9 +22,6 @@ pub enum ExportError {
         /// At most so many.
         most: u32,
     },
-    /// The texts are more than this process may use.
-    #[error("the testbench takes {0}; ask for fewer random frames, or allow more memory")]
-    Memory(#[from] MemoryShortage),
     /// Integer code needs the full scale to which an offset is relative.
     #[error(
         "channel {channel} has the offset {offset} of full scale, and integers need the bits of the samples to \
@@ -100,12 +96,6 @@ pub enum ExportError {
     /// Code of which the words are the ports needs the bits of the samples.
     #[error("the bits of the samples are the widths of the ports, and no channel of the spec states them")]
     NoInputBits,
-    /// Shift-and-add has no coefficients that a ROM could hold.
-    #[error(
-        "with several clocks for a frame the multipliers take their coefficients from a ROM, which shift-and-add \
-         has not; take one clock for each frame, or inferred multipliers"
-    )]
-    ShiftAddRom,
     /// MATLAB's files count rows and columns in 32 bits.
     #[error("\"{name}\" has {rows} x {columns} numbers, more than a .mat file can hold; write a table (csv)")]
     TooLarge {

@@ -37,7 +37,7 @@ pub use error::ExportError;
 pub use layout::{PolyphaseTaps, SparseBlock};
 pub use read_taps::{TapsError, taps_of_csv, taps_of_npy};
 pub use sections::{Section, block_of_sections, sections};
-pub use verilog::{Circuit, MOST_RANDOM_FRAMES, Multipliers, Verilog, VerilogOptions};
+pub use verilog::{Circuit, MOST_RANDOM_FRAMES, Verilog, VerilogOptions};
 
 use crate::bank::Bank;
 

@@ -71,21 +71,6 @@ impl AlignedInput {
         self.dropouts = Dropouts::new(lost.dropouts, self.header.channels);
     }
 
-    /// Takes invalid frames that have become known; true if some of them have been used.
-    pub(super) fn invalidate(&mut self, dropout: Dropout) -> bool {
-        self.dropouts.add(dropout)
-    }
-
-    /// `lost` frames were left out before frame `frame` of the input. True if that frame has been used;
-    /// then, or if a known break lies later, they are lost after these, so that later frames are in time.
-    pub(super) fn leave_out(&mut self, frame: u64, lost: u64) -> bool {
-        if lost > 0 {
-            let known = self.breaks.back().map_or(self.frames, |last| last.frame);
-            self.breaks.push_back(Break { frame: frame.max(known), lost });
-        }
-        lost > 0 && frame < self.frames
-    }
-
     /// The break at the next frame.
     fn at_break(&self) -> Option<Break> {
         self.breaks.front().copied().filter(|next| next.frame == self.frames)
@@ -231,15 +216,6 @@ impl Dropouts {
         let mut dropouts = Self { ahead: ahead.into(), channels: vec![0; channels], ..Self::default() };
         dropouts.enter();
         dropouts
-    }
-
-    /// Takes a dropout that has become known; true if some of its frames lie before the current one.
-    fn add(&mut self, dropout: Dropout) -> bool {
-        let is_late = dropout.frames.start < self.time;
-        let place = self.ahead.partition_point(|other| other.frames.start <= dropout.frames.start);
-        self.ahead.insert(place, dropout);
-        self.enter();
-        is_late
     }
 
     /// True if a channel is invalid at the current frame.

@@ -123,12 +123,6 @@ pub enum InputFault {
     /// A SigMF recording does not state its rate.
     #[error("it states no core:sample_rate; the rate of the bank is assumed")]
     NoRate,
-    /// Lines about lost samples came after their samples had been used.
-    #[error("{lines} line{} about lost samples came after these samples had been used", if *.lines == 1 { "" } else { "s" })]
-    LateLostLines {
-        /// Number of lines.
-        lines: u64,
-    },
     /// Samples beyond full scale, which is 1, of an input that does not state its own.
     #[error(
         "its samples reach {}, and full scale is 1 unless it is stated{}", Number(*.peak),

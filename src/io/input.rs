@@ -4,13 +4,12 @@ use super::aligned_input::{AlignedInput, Block};
 use super::capture::InputNotes;
 use super::frames::{InputFrames, Message};
 use super::grouped::GroupedInput;
-use super::lost::{Dropout, Entry, LostInInput};
+use super::lost::LostInInput;
 use super::open::InputSource;
 use super::pipe::is_file;
 use super::stall::Wait;
 #[cfg(target_os = "linux")]
 use super::stdin_reader::read_stdin;
-use super::timestamps::{Timestamp, lost_between};
 use super::{InputFault, IoError, StreamHeader};
 use crossbeam_channel::{Receiver, Sender, bounded, select};
 use std::thread;
@@ -48,21 +47,9 @@ pub(super) struct Input {
     pub(super) name: String,
     pub(super) grouped: GroupedInput,
     source: Source,
-    live: Live,
     /// What it says besides its samples.
     pub(super) notes: InputNotes,
     faults: Vec<InputFault>,
-}
-
-/// What became known of lost samples during the run.
-#[derive(Debug, Default)]
-struct Live {
-    /// The last frame whose number is known.
-    last: Option<Timestamp>,
-    /// Frames that were left out.
-    lost: u64,
-    /// Lines that came after their samples were used.
-    late: u64,
 }
 
 /// The source of an input's frames.
@@ -127,7 +114,6 @@ impl Input {
             name,
             grouped: GroupedInput::new(AlignedInput::new(header), per_frame),
             source,
-            live: Live::default(),
             notes: InputNotes::default(),
             faults: Vec::new(),
         }
@@ -214,46 +200,18 @@ impl Input {
         Ok(())
     }
 
-    /// Takes what became known of lost samples during the run: of a channel of this input, from 0, or of
-    /// all. At most `max_lost` frames may be left out.
-    pub(super) fn lose_live(
-        &mut self,
-        channel: Option<usize>,
-        entry: &Entry,
-        max_lost: u64,
-    ) -> Result<(), String> {
-        let is_late = match entry {
-            Entry::Invalid(frames) => {
-                self.grouped.aligned.invalidate(Dropout { channel, frames: frames.clone() })
-            }
-            Entry::Timestamp(next) => {
-                let Some(last) = self.live.last.replace(*next) else { return Ok(()) };
-                let lost = lost_between(last, *next)?;
-                self.live.lost = self.live.lost.saturating_add(lost);
-                if self.live.lost > max_lost {
-                    return Err(too_many_lost(self.live.lost, max_lost));
-                }
-                self.grouped.aligned.leave_out(next.frame, lost)
-            }
-        };
-        self.live.late += u64::from(is_late);
-        Ok(())
-    }
-
     pub(super) fn timing_fault(&self, problem: String) -> IoError {
         IoError::unfit(&self.name)(problem)
     }
 
     pub(super) fn faults(&self) -> impl Iterator<Item = InputFault> {
         let beyond = self.grouped.is_over() && self.grouped.aligned.has_unreached_breaks();
-        let late = (self.live.late > 0).then_some(InputFault::LateLostLines { lines: self.live.late });
         let unrated = self.notes.sigmf.is_some() && self.grouped.aligned.header.rate.is_none();
         let unrated = unrated.then_some(InputFault::NoRate);
         unrated
             .into_iter()
             .chain(self.faults.iter().copied())
             .chain(beyond.then_some(InputFault::TimestampsBeyondEnd))
-            .chain(late)
     }
 
     /// Frames that were not used.

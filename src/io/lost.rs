@@ -1,17 +1,13 @@
-//! Lost samples, from a file that lists them or from a pipe while the samples arrive.
+//! Lost samples, from a file that lists them.
 
 use super::IoError;
 use super::timestamps::{MAX_LOST_AT_ONCE, Timestamp, Timestamps};
 use crate::files::{Bound, read_text};
 use crate::messages::of_document;
-use crossbeam_channel::{Receiver, Sender, bounded};
 use serde::Deserialize;
 use std::collections::BTreeSet;
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
 use std::ops::Range;
-use std::path::{Path, PathBuf};
-use std::thread;
+use std::path::Path;
 
 /// Maximum size of a file of lost samples: a million lines.
 const LOST_FILE: Bound = Bound {
@@ -22,11 +18,6 @@ const LOST_FILE: Bound = Bound {
 
 /// Maximum number of lines of all inputs together, where a line for all channels counts once per input.
 const MOST_LINES: usize = 1 << 24;
-
-/// Lines that wait to be used; more wait in the pipe.
-const LINES: usize = 1024;
-/// Longest line; those of the format have a hundred bytes.
-const LONGEST_LINE: u64 = 4096;
 
 /// Invalid samples of one channel, or of all.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -81,7 +72,7 @@ struct Line {
 
 /// What a line says.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Entry {
+enum Entry {
     /// Samples before this one were left out, if its number has increased by more than the samples.
     Timestamp(Timestamp),
     /// These frames are in the input but invalid.
@@ -96,17 +87,17 @@ impl Entry {
 
 /// A line, checked.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct LostLine {
+struct LostLine {
     /// From 1.
-    pub(super) number: usize,
+    number: usize,
     /// The channel, from 0; `None` for all.
-    pub(super) channel: Option<usize>,
-    pub(super) entry: Entry,
+    channel: Option<usize>,
+    entry: Entry,
 }
 
 impl LostLine {
     /// Line `number` of a file, or what is wrong with it.
-    pub(super) fn parse(line: &str, number: usize) -> Result<Self, String> {
+    fn parse(line: &str, number: usize) -> Result<Self, String> {
         let line: Line = serde_json::from_str(line).map_err(|error| {
             format!("not an object that says what was lost: {}", of_document(&error.to_string()))
         })?;
@@ -245,77 +236,8 @@ impl LostSamples {
     }
 
     /// An error about this file.
-    pub(super) fn fault(&self, problem: String) -> IoError {
+    fn fault(&self, problem: String) -> IoError {
         IoError::unfit(&self.file)(problem)
-    }
-}
-
-/// A pipe of lines as [`LostSamples`](super::LostSamples) has them, read while the samples arrive.
-///
-/// Lines must come before their samples: what a line says of samples that have been used comes too late, and
-/// is counted. The first line of an input with `sample_start` only begins its count; the following ones say
-/// what was left out since.
-#[derive(Debug, Clone)]
-pub struct LiveLost {
-    file: String,
-    lines: Receiver<Result<LostLine, IoError>>,
-}
-
-impl LiveLost {
-    /// Begins to read on a thread of its own, which waits for the pipe's writer.
-    ///
-    /// # Errors
-    /// [`IoError`] for a thread that cannot be started.
-    pub fn begin(path: &Path) -> Result<Self, IoError> {
-        let file = path.display().to_string();
-        let (sender, lines) = bounded(LINES);
-        let (name, path) = (file.clone(), path.to_owned());
-        let thread = thread::Builder::new().name("lost".into());
-        let started = thread.spawn(move || read(&path, &name, &sender));
-        started.map_err(IoError::system(&file, "start a thread that reads it"))?;
-        Ok(Self { file, lines })
-    }
-
-    /// A line that is there.
-    pub(super) fn next(&self) -> Result<Option<LostLine>, IoError> {
-        self.lines.try_recv().ok().transpose()
-    }
-
-    /// An error about a line.
-    pub(super) fn fault(&self, number: usize, problem: impl std::fmt::Display) -> IoError {
-        IoError::unfit(&self.file)(format!("line {number}: {problem}"))
-    }
-}
-
-/// Sends all lines. The thread ends when they are no longer wanted.
-fn read(path: &PathBuf, name: &str, lines: &Sender<Result<LostLine, IoError>>) {
-    let file = match File::open(path) {
-        Ok(file) => file,
-        Err(error) => return drop(lines.send(Err(IoError::system(name, "open it")(error)))),
-    };
-    let mut reader = BufReader::new(file);
-    for number in 1.. {
-        let line = next_line(&mut reader, name, number);
-        let is_last = !matches!(line, Some(Ok(_)));
-        let is_blank = matches!(&line, Some(Ok(text)) if text.trim().is_empty());
-        let fault = |problem| IoError::unfit(name)(format!("line {number}: {problem}"));
-        let parsed = line.filter(|_| !is_blank).map(|line| LostLine::parse(&line?, number).map_err(fault));
-        if parsed.is_some_and(|line| lines.send(line).is_err()) || is_last {
-            return;
-        }
-    }
-}
-
-fn next_line(reader: &mut impl BufRead, name: &str, number: usize) -> Option<Result<String, IoError>> {
-    let fault = |problem| IoError::unfit(name)(problem);
-    let mut line = Vec::new();
-    match reader.take(LONGEST_LINE + 1).read_until(b'\n', &mut line) {
-        Err(error) => Some(Err(IoError::system(name, "read it")(error))),
-        Ok(0) => None,
-        Ok(length) if length as u64 > LONGEST_LINE => Some(Err(fault(format!(
-            "line {number} is longer than {LONGEST_LINE} bytes; give one object per line"
-        )))),
-        Ok(_) => Some(String::from_utf8(line).map_err(|_| fault(format!("line {number} is not UTF-8")))),
     }
 }
 
@@ -394,17 +316,5 @@ mod tests {
             assert!(error.starts_with("lost.jsonl: line 2: ") && error.contains(part), "{error}");
             assert!(!error.contains("column"), "{error}");
         }
-    }
-
-    #[test]
-    fn lines_are_bounded_and_named() {
-        let mut text = "{}\n".repeat(2);
-        text += &"x".repeat(5000);
-        let mut reader = BufReader::new(text.as_bytes());
-        let mut next = |number| next_line(&mut reader, "lost", number);
-        assert_eq!(next(1).unwrap().unwrap(), "{}\n");
-        assert_eq!(next(2).unwrap().unwrap(), "{}\n");
-        let error = next(3).unwrap().unwrap_err().to_string();
-        assert!(error.contains("lost: line 3 is longer than 4096 bytes"), "{error}");
     }
 }

@@ -18,9 +18,7 @@
 //! writer.write(&[0x00, 0x40, 0x00, 0xC0])?;
 //! commit_all(writer.finish()?)?;
 //!
-//! // This channel never asks for a stop.
-//! let recording = MultiReader::start(&[path.clone()], ReadOptions::files(), crossbeam_channel::never())?;
-//! let mut reader = recording.ok_or("stopped")?;
+//! let mut reader = MultiReader::start(&[path.clone()], ReadOptions::files())?;
 //! assert!(reader.headers().all(|(_, header)| header.rate == Some(48_000.0)));
 //! assert_eq!(OfflineSamples::read(&mut reader, 1000)?.channels, [[0.5, -0.5]]);
 //! # std::fs::remove_file(path)?;
@@ -66,14 +64,14 @@ pub use array::{ArrayHeader, ArrayReader};
 pub use csv::CsvReader;
 pub use error::{InputFault, InputWarning, IoError};
 pub use frame_file::FrameFile;
-pub use lost::{LiveLost, LostSamples};
+pub use lost::LostSamples;
 pub use mat::{mat_variable, open_mat};
 pub use multi_reader::{Arrival, MultiReader};
 pub use notes::{OutputNotes, Placement};
 pub use npy::npy_header;
 pub use offline::{OfflineError, OfflineSamples, check_real};
 pub use open::is_self_describing;
-pub use pipe::{Stdout, is_pipe};
+pub use pipe::{is_pipe, open_fifo, stdout_file};
 pub use rails::rails_of;
 pub use read_options::{BLOCK_BYTES, ReadOptions, TimeInterleaving, Until};
 pub use sample_writer::{Container, OutputHeader, SampleWriter};

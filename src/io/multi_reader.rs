@@ -6,7 +6,7 @@
 
 use super::grouped::GroupedInput;
 use super::input::{BLOCKS, Input, too_many_lost};
-use super::lost::{Entry, LiveLost, LostInInput, LostLine, LostSamples};
+use super::lost::{LostInInput, LostSamples};
 use super::notes::{OutputNotes, Placement};
 use super::open::InputSource;
 use super::pipe::refuse_shared_pipes;
@@ -42,7 +42,6 @@ pub struct MultiReader {
     stop: Receiver<()>,
     until: Until,
     stalls: Option<StallWatch>,
-    live: Option<LiveLost>,
     max_lost: u64,
     /// Number of the earliest frame at the converter.
     origin: u64,
@@ -54,18 +53,13 @@ pub struct MultiReader {
 impl MultiReader {
     /// Starts reading and waits for the headers. `-` is standard input. A name that ends in sigmf-meta or
     /// sigmf-data is a SigMF recording, everything else is as [`ReadOptions::coding`] says. Time counts
-    /// from the earliest sample whose number is known: inputs that join late begin with lost samples. A
-    /// message on `stop` ends any wait.
+    /// from the earliest sample whose number is known: inputs that join late begin with lost samples.
     ///
     /// # Errors
     /// [`IoError`] for an input that cannot be read or is not plain PCM, for a pipe that is given twice,
     /// for lost samples that do not fit the inputs or are more than [`ReadOptions::max_lost`], and for a
-    /// thread that cannot be started; `Ok(None)` if a stop was requested first.
-    pub fn start(
-        paths: &[PathBuf],
-        options: ReadOptions<'_>,
-        stop: Receiver<()>,
-    ) -> Result<Option<Self>, IoError> {
+    /// thread that cannot be started.
+    pub fn start(paths: &[PathBuf], options: ReadOptions<'_>) -> Result<Self, IoError> {
         if let Some(path) = paths.get(MOST_INPUTS) {
             let problem =
                 format!("it is one of {} inputs; at most {MOST_INPUTS} are read together", paths.len());
@@ -94,17 +88,21 @@ impl MultiReader {
                 .collect::<Result<_, _>>()?,
         };
         let ReadOptions { until, max_lost, lost, .. } = options;
-        let (stalls, live) = (options.stalls.cloned(), options.live_lost.cloned());
-        let mut reader =
-            Self { inputs, stop, until, stalls, live, max_lost, origin: 0, ready: 0, consumed: 0 };
+        let (stalls, stop) = (options.stalls.cloned(), crossbeam_channel::never());
+        let mut reader = Self { inputs, stop, until, stalls, max_lost, origin: 0, ready: 0, consumed: 0 };
         for i in 0..paths.len() {
-            if reader.inputs[i].sends_header() && !reader.receive(i)? {
-                return Ok(None);
+            if reader.inputs[i].sends_header() {
+                reader.receive(i)?;
             }
         }
         reader.refuse_some_complex()?;
         reader.align(lost)?;
-        Ok(Some(reader))
+        Ok(reader)
+    }
+
+    /// From now on a message on `stop` ends any wait.
+    pub fn stop_at(&mut self, stop: Receiver<()>) {
+        self.stop = stop;
     }
 
     /// N, the samples of a frame: those of all channels of all inputs.
@@ -139,8 +137,7 @@ impl MultiReader {
     /// Waits until every input has a frame.
     ///
     /// # Errors
-    /// The system's refusal to read one of them, [`IoError::ReaderDied`], or [`IoError::Unfit`] for a line
-    /// of [`ReadOptions::live_lost`] that is malformed or does not fit the inputs.
+    /// The system's refusal to read one of them, or [`IoError::ReaderDied`].
     pub fn wait(&mut self) -> Result<Arrival, IoError> {
         for i in 0..self.inputs.len() {
             self.inputs[i].grouped.gather(false);
@@ -151,8 +148,6 @@ impl MultiReader {
                 self.inputs[i].grouped.gather(false);
             }
         }
-        // Now, not before: what is said while the samples are waited for holds for them.
-        self.take_live_lines()?;
         if self.until == Until::Longest {
             self.inputs
                 .iter_mut()
@@ -214,36 +209,6 @@ impl MultiReader {
         let channels = before + 1..=before + input.grouped.aligned.header.channels;
         let wait = Wait::new(self.stalls.as_ref(), &input.name, channels);
         input.receive(&self.stop, wait)
-    }
-
-    /// Takes what is known by now of lost samples.
-    fn take_live_lines(&mut self) -> Result<(), IoError> {
-        let Some(live) = &self.live else { return Ok(()) };
-        while let Some(LostLine { number, channel, entry }) = live.next()? {
-            let fault = |problem: String| live.fault(number, problem);
-            let mut first = 0;
-            let mut is_named = channel.is_none();
-            for input in &mut self.inputs {
-                let here = first..first + input.grouped.aligned.header.channels;
-                first = here.end;
-                if channel.is_some_and(|channel| !here.contains(&channel)) {
-                    continue;
-                }
-                is_named = true;
-                if here.len() > 1 && channel.is_some() && matches!(entry, Entry::Timestamp(_)) {
-                    let problem = "interleaved channels lose samples together; leave out channel, or give first and length";
-                    return Err(fault(problem.into()));
-                }
-                let within = channel.map(|channel| channel - here.start);
-                let max_lost = self.max_lost.saturating_mul(input.grouped.per_frame() as u64);
-                input.lose_live(within, &entry, max_lost).map_err(fault)?;
-            }
-            if !is_named {
-                let channel = channel.map_or(0, |channel| channel + 1);
-                return Err(fault(format!("channel {channel} is named, but there are {first}")));
-            }
-        }
-        Ok(())
     }
 
     fn refuse_some_complex(&self) -> Result<(), IoError> {

@@ -1,11 +1,8 @@
 //! Recordings in memory.
 
 use super::{Arrival, IoError, MultiReader, PcmFrames};
-use crate::memory::{MemoryShortage, check_memory};
 use crate::messages::Quoted;
-
-/// Bytes of work memory for each sample of a recording: the sample, its spectrum and a copy of both.
-const WORK_BYTES: f64 = 64.0;
+use std::collections::TryReserveError;
 
 /// Recordings that are not read.
 #[derive(Debug, thiserror::Error)]
@@ -23,19 +20,16 @@ pub enum OfflineError {
         /// The input.
         input: String,
     },
-    /// The system does not have the work memory.
-    #[error("{frames} frames of {channels} channels take {shortage}; use a shorter part of the recording")]
+    /// The system does not have the memory.
+    #[error(
+        "{frames} frames of {channels} channels do not fit in memory; use a shorter part of the recording"
+    )]
     Memory {
         /// Frames.
         frames: usize,
         /// Channels; of complex samples each part is one.
         channels: usize,
-        /// Memory that they take, and what the process may use.
-        shortage: MemoryShortage,
     },
-    /// The reading was stopped.
-    #[error("interrupted")]
-    Stopped,
 }
 
 /// All channels of a reader; of complex samples each part is a channel.
@@ -56,25 +50,20 @@ impl OfflineSamples {
         let parts = if reader.is_complex() { 2 } else { 1 };
         let mut channels = vec![Vec::new(); parts * reader.channels()];
         let promised = reader.promised_frames().and_then(|frames| usize::try_from(frames).ok());
-        let mut checked = promised.unwrap_or_default().min(most);
-        check_work(checked, channels.len())?;
+        reserve(&mut channels, promised.unwrap_or_default().min(most))?;
         loop {
             match reader.wait()? {
                 Arrival::Frames(count) => {
                     let known = channels.first().map_or(0, Vec::len);
                     let room = most - known;
-                    if known + count > checked {
-                        checked = (checked + checked / 4).max(known + count).min(most);
-                        check_work(checked, channels.len())?;
-                    }
+                    reserve(&mut channels, count.min(room))?;
                     append(&reader.frames(), count.min(room), &mut channels);
                     reader.consume(count);
                     if room < count {
                         return Ok(Self { channels, is_cut: true });
                     }
                 }
-                Arrival::End => return Ok(Self { channels, is_cut: false }),
-                Arrival::Stopped => return Err(OfflineError::Stopped),
+                arrival => return Ok(Self { channels, is_cut: arrival == Arrival::Stopped }),
             }
         }
     }
@@ -98,10 +87,12 @@ pub fn check_real(reader: &MultiReader) -> Result<(), OfflineError> {
     }
 }
 
-/// Refuses recordings whose work memory the system does not have.
-fn check_work(frames: usize, channels: usize) -> Result<(), OfflineError> {
-    let bytes = WORK_BYTES * frames as f64 * channels as f64;
-    check_memory(bytes).map_err(|shortage| OfflineError::Memory { frames, channels, shortage })
+/// Makes room for `more` frames.
+fn reserve(channels: &mut [Vec<f64>], more: usize) -> Result<(), OfflineError> {
+    let frames = channels.first().map_or(0, Vec::len) + more;
+    let refused = OfflineError::Memory { frames, channels: channels.len() };
+    let reserved = channels.iter_mut().try_for_each(|samples| samples.try_reserve(more));
+    reserved.map_err(|_: TryReserveError| refused)
 }
 
 /// The first `count` frames of all parts.

@@ -1,7 +1,7 @@
 //! Standard input and output as files, and pipes with buffers large enough for two processes.
 
 use super::IoError;
-use crate::files::{REPORT_WRITE_BEGAN, STDOUT_WRITE_BEGAN, StandardStream, Watched, is_same_file};
+use crate::files::is_same_file;
 use crate::messages::Quoted;
 use std::fs::File;
 use std::io;
@@ -16,7 +16,6 @@ const PIPE_BYTES: usize = 1 << 20;
 #[cfg(unix)]
 pub(super) fn stdin_file() -> io::Result<File> {
     use std::os::fd::AsFd;
-    StandardStream::Input.check()?;
     let file = File::from(io::stdin().as_fd().try_clone_to_owned()?);
     widen_pipe(&file);
     Ok(file)
@@ -24,73 +23,38 @@ pub(super) fn stdin_file() -> io::Result<File> {
 
 #[cfg(not(unix))]
 pub(super) fn stdin_file() -> io::Result<io::Stdin> {
-    StandardStream::Input.check()?;
     Ok(io::stdin())
 }
 
-/// Standard output without line buffering.
+/// Standard output without line buffering, with a wide pipe where the system allows it.
+///
+/// # Errors
+/// The system's refusal to duplicate the descriptor.
 #[cfg(unix)]
-fn stdout_file() -> io::Result<File> {
+pub fn stdout_file() -> io::Result<File> {
     use std::os::fd::AsFd;
-    StandardStream::Output.check()?;
     let file = File::from(io::stdout().as_fd().try_clone_to_owned()?);
     widen_pipe(&file);
     Ok(file)
 }
 
+/// Standard output.
+///
+/// # Errors
+/// None here.
 #[cfg(not(unix))]
-fn stdout_file() -> io::Result<io::Stdout> {
-    StandardStream::Output.check()?;
+pub fn stdout_file() -> io::Result<io::Stdout> {
     Ok(io::stdout())
 }
 
-/// Standard output for samples, without a buffer.
-#[cfg(unix)]
-pub type Stdout = Watched<File>;
-/// Standard output for samples.
-#[cfg(not(unix))]
-pub type Stdout = Watched<io::Stdout>;
-
-impl Stdout {
-    /// Standard output, with a wide pipe where the system allows it.
-    ///
-    /// # Errors
-    /// The system's refusal to duplicate the descriptor.
-    pub fn for_samples() -> io::Result<Self> {
-        Ok(Watched::new(stdout_file()?, &STDOUT_WRITE_BEGAN))
-    }
-
-    /// The same stream for reports, which another thread writes than the samples: a report that gets through
-    /// says nothing about samples that wait.
-    pub fn for_reports(self) -> Self {
-        Self { began: &REPORT_WRITE_BEGAN, ..self }
-    }
-}
-
-#[cfg(unix)]
-impl Stdout {
-    /// A FIFO in place of standard output; waits for its reader.
-    ///
-    /// # Errors
-    /// The system's refusal to open it.
-    pub fn fifo(path: &Path) -> io::Result<Self> {
-        // An interrupt must end the wait too.
-        let mut waiting = Watched::new((), &STDOUT_WRITE_BEGAN);
-        let file = waiting.timed(|()| std::fs::OpenOptions::new().write(true).open(path))?;
-        widen_pipe(&file);
-        Ok(Watched::new(file, &STDOUT_WRITE_BEGAN))
-    }
-}
-
-#[cfg(not(unix))]
-impl Stdout {
-    /// Systems without FIFOs.
-    ///
-    /// # Errors
-    /// Always.
-    pub fn fifo(_: &Path) -> io::Result<Self> {
-        Err(io::ErrorKind::Unsupported.into())
-    }
+/// A FIFO in place of standard output; waits for its reader.
+///
+/// # Errors
+/// The system's refusal to open it.
+pub fn open_fifo(path: &Path) -> io::Result<File> {
+    let file = File::options().write(true).open(path)?;
+    widen_pipe(&file);
+    Ok(file)
 }
 
 /// Other files are not changed, nor are pipes whose buffer the system refuses to enlarge.

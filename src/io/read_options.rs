@@ -1,7 +1,7 @@
 //! Settings of the reading of several inputs.
 
 use super::timestamps::MAX_LOST;
-use super::{Coding, LiveLost, LostSamples, StallWatch};
+use super::{Coding, LostSamples, StallWatch};
 use crate::quantity::FullScale;
 
 /// Bytes of a block that suit one thread.
@@ -36,8 +36,6 @@ pub struct ReadOptions<'a> {
     pub samples_per_frame: &'a [usize],
     /// The lost samples, if a file lists them.
     pub lost: Option<&'a LostSamples>,
-    /// Lost samples that become known during the run.
-    pub live_lost: Option<&'a LiveLost>,
     /// Maximum number of lost frames of one input, by default [`MAX_LOST`]. Without a limit a wrong number
     /// would lead to endless output.
     pub max_lost: u64,
@@ -60,7 +58,6 @@ impl ReadOptions<'_> {
             interleaving: None,
             samples_per_frame: &[],
             lost: None,
-            live_lost: None,
             max_lost: MAX_LOST,
             until: Until::Shortest,
             block_bytes: BLOCK_BYTES,

@@ -3,7 +3,7 @@
 
 use super::sigmf::malformed;
 use super::wav::{WavFile, stream_header};
-use super::{IoError, OutputNotes, PcmFormat, SigmfMeta, Stdout, is_pipe, is_same_rate};
+use super::{IoError, OutputNotes, PcmFormat, SigmfMeta, is_pipe, is_same_rate, open_fifo, stdout_file};
 use crate::files::{AtomicFile, is_same_file};
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -40,7 +40,7 @@ enum Target {
         meta: Option<AtomicFile>,
     },
     /// Standard output or a FIFO.
-    Stream(Stdout),
+    Stream(Box<dyn Write + Send>),
 }
 
 /// A writer of one channel of encoded samples.
@@ -199,7 +199,8 @@ fn stream_target(path: &Path, header: &[u8]) -> io::Result<Target> {
     if to_stdout && io::stdout().is_terminal() {
         return Err(io::Error::other("it is a terminal; redirect it to a file or a pipe"));
     }
-    let mut stream = if to_stdout { Stdout::for_samples()? } else { Stdout::fifo(path)? };
+    let mut stream: Box<dyn Write + Send> =
+        if to_stdout { Box::new(stdout_file()?) } else { Box::new(open_fifo(path)?) };
     stream.write_all(header)?;
     Ok(Target::Stream(stream))
 }

@@ -118,7 +118,7 @@ impl Timestamps {
 }
 
 /// Frames lost between two timestamps.
-pub(super) fn lost_between(a: Timestamp, b: Timestamp) -> Result<u64, String> {
+fn lost_between(a: Timestamp, b: Timestamp) -> Result<u64, String> {
     let lost = b.frame.checked_sub(a.frame).zip(b.index.checked_sub(a.index));
     let lost = lost.and_then(|(frames, time)| time.checked_sub(frames)).ok_or_else(|| {
         format!(

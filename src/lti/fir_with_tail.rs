@@ -41,7 +41,7 @@ impl FirWithTail {
 
     /// The same transfer function with q = `length` and all states in the tail:
     /// `y[k] = sum h_j u[k - j] + c a^q x[k - q]`.
-    pub(crate) fn split(system: &StateSpace, length: usize) -> Self {
+    fn split(system: &StateSpace, length: usize) -> Self {
         let mut head = vec![system.d().clone()];
         let mut c = system.c().clone();
         for _ in 0..length {
@@ -50,26 +50,6 @@ impl FirWithTail {
         }
         let zero = Mat::zeros(system.outputs(), system.inputs());
         Self { head, tail: StateSpace::new(system.a().clone(), system.b().clone(), c, zero) }
-    }
-
-    /// The tail x+ = a x + b u after a head of q = `length`, with `outputs` = [c h_q .. h_0].
-    pub(crate) fn with_outputs(outputs: &Mat, length: usize, a: &Mat, b: &Mat) -> Self {
-        let (p, n, m) = (outputs.nrows(), a.nrows(), b.ncols());
-        let tap = |j: usize| outputs.columns(n + (length - j) * m, m).into_owned();
-        let c = outputs.columns(0, n).into_owned();
-        let tail = StateSpace::new(a.clone(), b.clone(), c, Mat::zeros(p, m));
-        Self { head: (0..=length).map(tap).collect(), tail }
-    }
-
-    /// The same outputs for inputs u = `gain` v.
-    pub(crate) fn map_inputs(&self, gain: &Mat) -> Self {
-        let tail = self.tail.map_inputs(gain);
-        Self { head: self.head.iter().map(|tap| tap * gain).collect(), tail }
-    }
-
-    /// a, b, c of the tail, with d = 0.
-    pub(crate) fn tail(&self) -> &StateSpace {
-        &self.tail
     }
 
     /// The tail as parallel sections, see [`parallel_form`].

@@ -6,6 +6,9 @@ use std::f64::consts::PI;
 pub(super) const FLAT_GAIN: f64 = 1e-11;
 /// Gains with a relative difference below this count as equal.
 const EQUAL_GAINS: f64 = 1e-13;
+/// Frequencies closer than this are the same in doubles. A resonance may be that narrow, so its peak is not
+/// reached before.
+const LEAST_WIDTH: f64 = 4.0 * f64::EPSILON;
 /// Steps of a refinement are at least this part of the width that is left.
 const LEAST_STEP: f64 = 1e-3;
 
@@ -37,7 +40,7 @@ pub(crate) fn refine<E>(
 ) -> Result<Peak, E> {
     let mut best = start;
     let (mut stalls, mut flats) = (0, 0);
-    while high.frequency - low.frequency > 1e-9 && flats < 2 {
+    while high.frequency - low.frequency > LEAST_WIDTH && flats < 2 {
         let w = next_abscissa(low, best, high, stalls);
         let tried = at(w)?;
         let gained = tried.gain - best.gain;

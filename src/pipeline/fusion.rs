@@ -4,7 +4,7 @@ use super::gaps::GapFiller;
 use super::{Gap, GapPolicy, Outcome};
 use crate::bank::Bank;
 use crate::runtime::{
-    Input, Interleaved, Isa, Options, Output, Plan, ProcessError, Sample, SplitOutput, Stream, ThreadPool,
+    Input, Interleaved, Isa, Options, Output, Plan, ProcessError, SplitOutput, Stream, ThreadPool,
 };
 use std::ops::Range;
 
@@ -130,9 +130,9 @@ impl<'a> Fusion<'a> {
     /// `output`; returns how many.
     pub(super) fn step(
         &mut self,
-        parts: &[impl Input + Sync],
+        parts: &[impl Input],
         most: usize,
-        output: &mut (impl SplitOutput + ?Sized),
+        output: &mut dyn SplitOutput,
     ) -> Result<usize, ProcessError> {
         let samples = parts.first().map_or(0, Input::frames) * self.stream().ratio();
         let dropped = self.skip.min(samples);
@@ -166,7 +166,7 @@ impl<'a> Fusion<'a> {
         &mut self,
         frames: usize,
         most: usize,
-        output: &mut (impl SplitOutput + ?Sized),
+        output: &mut dyn SplitOutput,
     ) -> Result<usize, ProcessError> {
         let offsets = std::mem::take(&mut self.offsets);
         let silence = vec![Silence { offsets: &offsets, frames }; self.parts()];
@@ -200,9 +200,9 @@ impl<'a> Fusion<'a> {
 /// Filters frames; of their outputs only those in `kept` are stored, if not all are.
 fn run(
     stream: &mut Stream,
-    input: &(impl Input + Sync),
+    input: &dyn Input,
     kept: Option<Range<usize>>,
-    output: &mut (impl SplitOutput + ?Sized),
+    output: &mut dyn SplitOutput,
     workers: Option<&ThreadPool>,
 ) -> Result<usize, ProcessError> {
     match (kept, workers) {
@@ -213,20 +213,33 @@ fn run(
 }
 
 /// Room for some of the outputs of a call; the others are dropped before they are encoded.
-struct Kept<'a, O: ?Sized> {
-    output: &'a mut O,
+struct Kept<'a> {
+    output: &'a mut dyn Output,
     range: Range<usize>,
 }
 
-impl<O: Output + ?Sized> Output for Kept<'_, O> {
+impl Kept<'_> {
+    /// Where the output takes samples of `count` from sample `first` on, and which of them.
+    fn kept(&self, first: usize, count: usize) -> Option<(usize, Range<usize>)> {
+        let (begin, end) = (self.range.start.max(first), self.range.end.min(first + count));
+        (begin < end).then(|| (begin - self.range.start, begin - first..end - first))
+    }
+}
+
+impl Output for Kept<'_> {
     fn capacity(&self) -> usize {
         usize::MAX
     }
 
-    fn store<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]) {
-        let (begin, end) = (self.range.start.max(first), self.range.end.min(first + samples.len()));
-        if begin < end {
-            self.output.store(isa, begin - self.range.start, &samples[begin - first..end - first]);
+    fn store_f32(&mut self, isa: Isa, first: usize, samples: &[f32]) {
+        if let Some((place, kept)) = self.kept(first, samples.len()) {
+            self.output.store_f32(isa, place, &samples[kept]);
+        }
+    }
+
+    fn store_f64(&mut self, isa: Isa, first: usize, samples: &[f64]) {
+        if let Some((place, kept)) = self.kept(first, samples.len()) {
+            self.output.store_f64(isa, place, &samples[kept]);
         }
     }
 }
@@ -251,9 +264,15 @@ impl Input for Silence<'_> {
         true
     }
 
-    fn load<T: Sample>(&self, _: Isa, _: usize, samples: &mut [T]) {
+    fn load_f32(&self, _: Isa, _: usize, samples: &mut [f32]) {
         for (slot, &offset) in samples.iter_mut().zip(self.offsets.iter().cycle()) {
-            *slot = T::from_f64(offset);
+            *slot = offset as f32;
+        }
+    }
+
+    fn load_f64(&self, _: Isa, _: usize, samples: &mut [f64]) {
+        for (slot, &offset) in samples.iter_mut().zip(self.offsets.iter().cycle()) {
+            *slot = offset;
         }
     }
 }

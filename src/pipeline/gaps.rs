@@ -123,7 +123,7 @@ impl GapFiller {
         let n = self.places.len();
         for (numbers, part) in self.numbers.iter_mut().zip(parts) {
             numbers.resize(frames * n, 0.0);
-            part.load(Isa::detect(), 0, numbers);
+            part.load_f64(Isa::detect(), 0, numbers);
         }
         for frame in 0..frames {
             (0..n).for_each(|i| self.fill_sample(frame * n + i, i));
@@ -177,7 +177,7 @@ impl GapFiller {
         }
         for (p, (numbers, part)) in self.numbers.iter_mut().zip(parts).enumerate() {
             numbers.resize(self.places.len(), 0.0);
-            part.load(Isa::detect(), frames - 1, numbers);
+            part.load_f64(Isa::detect(), frames - 1, numbers);
             // In the order of time, so that the last sample of a converter remains.
             self.places.iter().zip(numbers).for_each(|(place, last)| {
                 self.converters[place.of.converter].last[p] = *last;

@@ -35,12 +35,12 @@ const MULTIPLY_ADDS_PER_STORE: usize = 8;
 pub fn fuse(
     bank: &Bank,
     plan: &Plan,
-    parts: &[impl Input + Sync],
-    output: &mut (impl SplitOutput + ?Sized),
+    parts: &[&dyn Input],
+    output: &mut dyn SplitOutput,
     settings: Settings<'_>,
     stop: &dyn Fn() -> bool,
 ) -> Result<Outcome, PipelineError> {
-    let (frames, ratio) = (parts.first().map_or(0, Input::frames), plan.ratio());
+    let (frames, ratio) = (parts.first().map_or(0, |part| part.frames()), plan.ratio());
     let wanted = frames.checked_mul(ratio).ok_or(ProcessError::TooManyFrames { frames, ratio })?;
     if parts.len() > 1 {
         output.select(0);
@@ -55,16 +55,27 @@ pub fn fuse(
             return Err(PipelineError::Stopped);
         }
         let end = fusion.step_end(first..frames, most);
-        let step: Vec<_> = parts.iter().map(|part| Frames::new(part, first..end)).collect();
-        written += output.halves(written, |_, rest| fusion.step(&step, usize::MAX, rest))?;
+        let step: Vec<_> = parts.iter().map(|part| Frames::new(*part, first..end)).collect();
+        written += after(output, written, &mut |rest| fusion.step(&step, usize::MAX, rest))?;
         mask.extend_from_slice(fusion.marks().unwrap_or_default());
         first = end;
     }
     let missing = wanted - written;
-    output.halves(written, |_, rest| fusion.flush(fusion.flush_frames(missing), missing, rest))?;
+    after(output, written, &mut |rest| fusion.flush(fusion.flush_frames(missing), missing, rest))?;
     mask.extend_from_slice(fusion.marks().unwrap_or_default());
     let outcome = fusion.finish(wanted as u64, 0);
     Ok(Outcome { mask: settings.gaps.map(|_| mask), ..outcome })
+}
+
+/// What `write` does with the room after the first `samples` samples.
+fn after(
+    output: &mut dyn SplitOutput,
+    samples: usize,
+    write: &mut dyn FnMut(&mut dyn SplitOutput) -> Result<usize, ProcessError>,
+) -> Result<usize, ProcessError> {
+    let mut written = Ok(0);
+    output.halves(samples, &mut |_, rest| written = write(rest));
+    written
 }
 
 /// A signal in memory in double precision, fused as by [`fuse`]: M output samples per frame. Channels that
@@ -78,12 +89,12 @@ pub fn fused(bank: &Bank, channels: &[Vec<f64>], settings: Settings<'_>) -> Resu
     let frames = channels.iter().map(Vec::len).min().unwrap_or(0);
     let cut: Vec<&[f64]> = channels.iter().map(|channel| &channel[..frames]).collect();
     let mut output = vec![0.0; frames * bank.ratio];
-    fuse(bank, &plan, &[Planar::new(&cut)?], &mut output[..], settings, &|| false)?;
+    fuse(bank, &plan, &[&Planar::new(&cut)?], &mut output.as_mut_slice(), settings, &|| false)?;
     Ok(output)
 }
 
-fn check(plan: &Plan, parts: &[impl Input], capacity: usize, wanted: usize) -> Result<(), ProcessError> {
-    let wrong = parts.iter().map(Input::channels).find(|given| *given != plan.channels());
+fn check(plan: &Plan, parts: &[&dyn Input], capacity: usize, wanted: usize) -> Result<(), ProcessError> {
+    let wrong = parts.iter().map(|part| part.channels()).find(|given| *given != plan.channels());
     if let Some(given) = wrong {
         return Err(ProcessError::Channels { given, wanted: plan.channels() });
     }

@@ -93,11 +93,11 @@ impl<'a> Pipeline<'a> {
     /// [`PipelineError::Process`] if the channels do not match the bank, and the errors of `write`.
     pub fn push(&mut self, recordings: &[PcmFrames<'_>], write: Write<'_>) -> Result<(), PipelineError> {
         if self.fusion.parts() == 1 {
-            return self.run(&[recordings], write);
+            return self.run(&[&recordings], write);
         }
         let part = |part| recordings.iter().map(|frames| frames.part(part)).collect::<Vec<_>>();
         let [real, imaginary] = [part(0), part(1)];
-        self.run(&[&real[..], &imaginary[..]], write)
+        self.run(&[&real.as_slice(), &imaginary.as_slice()], write)
     }
 
     /// Processes frames without a signal (zeros, once the offsets are subtracted) until `samples` samples
@@ -123,7 +123,7 @@ impl<'a> Pipeline<'a> {
     }
 
     /// All frames of all parts, step by step.
-    fn run<I: Input + Sync + ?Sized>(&mut self, parts: &[&I], write: Write<'_>) -> Result<(), PipelineError> {
+    fn run(&mut self, parts: &[&dyn Input], write: Write<'_>) -> Result<(), PipelineError> {
         let frames = parts.first().map_or(0, |part| part.frames());
         let mut first = 0;
         while first < frames {
@@ -135,7 +135,7 @@ impl<'a> Pipeline<'a> {
         Ok(())
     }
 
-    fn step(&mut self, parts: &[impl Input + Sync], write: Write<'_>) -> Result<(), PipelineError> {
+    fn step(&mut self, parts: &[impl Input], write: Write<'_>) -> Result<(), PipelineError> {
         let frames = parts.first().map_or(0, Input::frames);
         let mut output = room(&mut self.buffer, self.format, frames * self.fusion.outputs());
         let written = self.fusion.step(parts, usize::MAX, &mut output)?;

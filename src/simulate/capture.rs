@@ -1,7 +1,7 @@
 //! Analog signals, and the samples of the ideal fast converter.
 
 use super::recording::Recording;
-use super::response::{self, Instants, sample};
+use super::response::{Instants, sample};
 use super::source::NormalisedSource;
 use super::walk::sample_at;
 use crate::analog::StrictlyProper;
@@ -27,14 +27,6 @@ pub fn target(problem: &Problem, signal: &Analog, periods: usize) -> Vec<f64> {
 }
 
 impl Analog {
-    /// Bytes of work memory for `count` samples of one converter, the result included.
-    pub fn work_bytes(&self, count: usize) -> usize {
-        match self {
-            Self::Known(source) => response::work_bytes(source, count),
-            Self::Recorded(recording) => recording.work_bytes(count),
-        }
-    }
-
     /// (phi * f)(t) at the given instants.
     pub(super) fn filtered(&self, filter: &StrictlyProper, instants: Instants) -> Vec<f64> {
         match self {

@@ -44,13 +44,6 @@ impl Recording {
         FastPeriods(self.length as f64 * self.spacing.0)
     }
 
-    /// Bytes of the arrays in [`Recording::sample`] for `count` instants: signal, kernel and their
-    /// transforms, of the size of the convolution, and the result.
-    pub(super) fn work_bytes(&self, count: usize) -> usize {
-        let size = (self.spectrum.len().saturating_add(count)).next_power_of_two();
-        size.saturating_mul(4 * size_of::<Complex<f64>>()).saturating_add(count.saturating_mul(8))
-    }
-
     /// (phi * f)(t) at the given instants.
     ///
     /// The sum over the L/2 harmonics at equally spaced instants is a chirp-z transform (Bluestein, 1970):

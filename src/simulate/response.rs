@@ -41,17 +41,6 @@ pub fn sample(filter: &StrictlyProper, source: &NormalisedSource, instants: Inst
     }
 }
 
-/// Bytes of the arrays in [`sample`] for `count` instants: the result, and one term of each sum at a time.
-pub(super) fn work_bytes(source: &NormalisedSource, count: usize) -> usize {
-    let nested = match source {
-        Source::Sum(terms) => terms.iter().map(|term| work_bytes(term, count)).max().unwrap_or(0),
-        // The instants and their order.
-        Source::Chirp { .. } => count.saturating_mul(2 * size_of::<f64>()),
-        Source::Step { .. } | Source::Tones(_) => 0,
-    };
-    count.saturating_mul(size_of::<f64>()).saturating_add(nested)
-}
-
 /// Steady state: amplitude |Phi(j omega)| cos(omega t + phase + arg Phi(j omega)).
 fn tones(filter: &StrictlyProper, tones: &[Tone<FastPeriods>], instants: Instants) -> Vec<f64> {
     let phasors: Vec<(f64, Complex<f64>)> =

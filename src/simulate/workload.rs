@@ -1,15 +1,14 @@
-//! What a simulation computes and holds in memory, and the limits of both.
+//! What a simulation computes, and its limits.
 
 use super::capture::Analog;
 use super::response::panels;
 use crate::design::Problem;
-use crate::memory::available_memory;
 use crate::units::FastPeriods;
 
 /// Least number of fast samples of an analytic source whose length is not given (thesis 5.6).
 const USUAL_SAMPLES: f64 = 200.0;
-/// Largest number of fast samples of a simulation: the target, in memory, then takes 2 GiB.
-pub const MOST_SAMPLES: usize = 1 << 28;
+/// Largest number of fast samples of a simulation: the transforms of a recording of this length take 4 GiB.
+pub const MOST_SAMPLES: usize = 1 << 25;
 /// Largest number of quadrature panels of a chirp per converter, about ten seconds of computing.
 const MOST_PANELS: f64 = 2e7;
 
@@ -25,16 +24,6 @@ pub enum WorkloadError {
     Samples {
         /// Fast samples.
         samples: usize,
-    },
-    /// The system does not give the memory.
-    #[error(
-        "{samples} fast samples take {gigabytes:.1} GB of memory, more than the system gives; ask for fewer samples"
-    )]
-    Memory {
-        /// Fast samples.
-        samples: usize,
-        /// Memory beside the samples.
-        gigabytes: f64,
     },
     /// The quadrature takes too long.
     #[error(
@@ -67,8 +56,8 @@ impl Analog {
 /// instants of the converters jitter.
 ///
 /// # Errors
-/// [`WorkloadError`]: no sample or too many, more memory than the system gives, or a chirp or a front end so
-/// fast that the quadrature would take too long.
+/// [`WorkloadError`]: no sample or too many, or a chirp or a front end so fast that the quadrature would take
+/// too long.
 pub fn frames(
     problem: &Problem,
     signal: &Analog,
@@ -81,14 +70,7 @@ pub fn frames(
         _ => {}
     }
     let frames = samples.div_ceil(problem.ratio);
-    let samples = frames * problem.ratio;
-    // Jitter, instants, their order, and a power of each jitter.
-    let bytes = signal.work_bytes(samples).saturating_add(if jittered { 32 * samples } else { 0 });
-    let is_available = available_memory().is_none_or(|memory| bytes as f64 <= memory);
-    if !is_available || Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
-        return Err(WorkloadError::Memory { samples, gigabytes: bytes as f64 / 1e9 });
-    }
-    let panels = most_panels(problem, signal, samples, jittered);
+    let panels = most_panels(problem, signal, frames * problem.ratio, jittered);
     if panels <= MOST_PANELS { Ok(frames) } else { Err(WorkloadError::Panels { panels }) }
 }
 

@@ -50,9 +50,6 @@ pub struct DesignTable<M> {
     /// Integer taps of the fewest bits that lose at most so many decibels of SNR, in place of `bits`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loss_db: Option<f64>,
-    /// Whether `loss_db` asks for few signed digits, not for few bits.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub digits: bool,
     /// For recursive methods, at most so many states, with the least error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub order: Option<usize>,
@@ -89,7 +86,7 @@ struct Key {
 }
 
 /// The keys that not every method reads.
-const KEYS: [Key; 9] = {
+const KEYS: [Key; 8] = {
     use Method::{Fir, H2, Iir, Separation, Sinc};
     [
         Key { name: "taps", methods: &[Fir, H2, Sinc, Separation], advised: "fir or h2" },
@@ -98,7 +95,6 @@ const KEYS: [Key; 9] = {
         Key { name: "bits", methods: &[Fir], advised: "fir" },
         Key { name: "fraction_bits", methods: &[Fir], advised: "fir" },
         Key { name: "loss_db", methods: &[Fir], advised: "fir" },
-        Key { name: "digits", methods: &[Fir], advised: "fir" },
         Key { name: "order", methods: &[Iir, H2], advised: "iir or h2" },
         Key { name: "reduction_loss_db", methods: &[Iir, H2], advised: "iir or h2" },
     ]
@@ -142,7 +138,6 @@ impl<M> DesignTable<M> {
             bits: self.bits,
             fraction_bits: self.fraction_bits,
             loss_db: self.loss_db,
-            digits: self.digits,
             order: self.order,
             reduction_loss_db: self.reduction_loss_db,
             noise: self.noise,
@@ -163,7 +158,6 @@ impl<M> DesignTable<M> {
             ("bits", self.bits.is_some()),
             ("fraction_bits", self.fraction_bits.is_some()),
             ("loss_db", self.loss_db.is_some()),
-            ("digits", self.digits),
             ("order", self.order.is_some()),
             ("reduction_loss_db", self.reduction_loss_db.is_some()),
             ("noise", self.noise.is_some()),
@@ -230,10 +224,6 @@ impl DesignSpec {
                 key,
                 SpecProblem::NeedlessKey { key, method: self.method.name(), remedy },
             ));
-        }
-        if self.digits && self.loss_db.is_none() {
-            let remedy = "digits are the fewest for a loss, for example loss_db = 0.1";
-            return Err(Refusal::new("digits", SpecProblem::MissingKey { key: "loss_db", remedy }));
         }
         if self.fraction_bits.is_some() && self.bits.is_none() {
             let remedy = "fraction_bits sets the binary point of integer taps, whose word length bits gives, for example bits = 16";
@@ -312,7 +302,6 @@ impl DesignOverrides {
             bits: self.bits.or(file.bits.filter(|_| keeps("bits"))),
             fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| keeps("fraction_bits"))),
             loss_db: self.loss_db.or(file.loss_db.filter(|_| keeps("loss_db"))),
-            digits: self.digits || file.digits && keeps("digits"),
             order: self.order.or(file.order.filter(|_| keeps("order") && self.reduction_loss_db.is_none())),
             reduction_loss_db: self
                 .reduction_loss_db

@@ -64,7 +64,7 @@ fn run(stream: &mut Stream, input: &[f32], pcm: bool, pieces: &[usize]) -> Vec<u
             let layout = SampleLayout::packed(PcmFormat::S16Le);
             let mut fast = vec![0; piece * m * 3];
             let mut output = PcmOutput::packed(PcmFormat::S24Be, &mut fast);
-            stream.run(&[PcmFrames { layout, channels: n, bytes: &coded }][..], &mut output).unwrap();
+            stream.run(&[PcmFrames { layout, channels: n, bytes: &coded }].as_slice(), &mut output).unwrap();
             out.extend(fast);
         } else {
             let mut fast = vec![0.0; piece * m];

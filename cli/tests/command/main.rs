@@ -16,13 +16,15 @@ mod converter_errors;
 mod cuts;
 mod design;
 mod docs;
-mod effort;
 mod examples;
 #[cfg(target_os = "linux")]
 mod export;
 mod faults;
 mod formats;
 mod fuse;
+mod impossible;
+#[cfg(target_os = "linux")]
+mod interrupts;
 #[cfg(unix)]
 mod live;
 #[cfg(target_os = "linux")]

@@ -86,48 +86,6 @@ fn the_samples_of_a_sigmf_recording_are_an_input_too() {
     assert_eq!(desk.read("samples.bin"), bytes(&frames(10)));
 }
 
-/// As the names of unfinished files have it.
-#[cfg(target_os = "linux")]
-fn host() -> String {
-    let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap();
-    name.trim().chars().take(16).map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
-}
-
-#[cfg(target_os = "linux")]
-#[test]
-fn what_a_killed_run_left_is_named() {
-    let desk = desk();
-    desk.write("spec.toml", crate::support::THESIS);
-    ["captures", "pages"].iter().for_each(|folder| fs::create_dir(desk.path(folder)).unwrap());
-    let stream = ["stream", "bank.json", "--input", "a.wav", "--format", "wav"];
-    for (args, output) in [
-        (&["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav"][..], "out.wav"),
-        (&["fuse", "bank.json", "a.wav", "b.wav", "-o", "o.wav", "--gaps", "zero", "--mask", "mask"], "mask"),
-        (&[&stream[..], &["--input", "b.wav", "-o", "out.sigmf-meta"]].concat(), "out.sigmf-data"),
-        (&["design", "spec.toml", "-o", "new.json"], "new.json"),
-        (&["simulate", "spec.toml", "--source", "step@3", "-o", "captures"], "captures/target.wav"),
-        (&["man", "pages"], "pages/hybank-design.1"),
-    ] {
-        // Above the largest number that Linux gives to a process; this run is alive.
-        let hidden = |process: u32| {
-            let path = desk.path(output);
-            let name = path.file_name().unwrap().to_str().unwrap();
-            path.with_file_name(format!(".{name}.{}-{process}-0.part", host()))
-        };
-        let (stale, alive) = (hidden((1 << 22) + 1), hidden(std::process::id()));
-        [&stale, &alive].into_iter().for_each(|path| fs::write(path, "half").unwrap());
-        let done = desk.run(args, &[]);
-        let message = text(&done.stderr);
-        assert!(done.status.success() && message.lines().count() == 1, "{args:?}: {message}");
-        let name = stale.file_name().unwrap().to_str().unwrap();
-        assert!(
-            message.contains(name) && message.contains("no longer runs; remove it"),
-            "{args:?}: {message}"
-        );
-        assert!(stale.exists() && alive.exists(), "{args:?}");
-    }
-}
-
 #[test]
 fn output_and_mask_are_two_files() {
     let desk = desk();

@@ -87,8 +87,8 @@ fn shapes() -> Vec<Shape> {
         shape(small.clone(), 6, 2, "--accumulator 12"),
         shape(small.clone(), 5, 2, "--accumulator 12 --clocks-per-frame 3 --output-bits 5"),
         shape(small.clone(), 30, 2, ""),
-        shape(small, 6, 2, "--multipliers shift-add --pipeline 2"),
-        shape(wild(3, 7), 7, 2, "--multipliers shift-add"),
+        shape(small, 6, 2, "--pipeline 2"),
+        shape(wild(3, 7), 7, 2, ""),
         shape(wild(5, 4), 7, 4, "--clocks-per-frame 8"),
         shape(wild(1, 9), 4, 1, ""),
         shape(wild(2, 6), 4, 2, "--clocks-per-frame 100"),
@@ -236,7 +236,7 @@ fn bits_that_hold_all_sums_are_the_least() {
 /// sums, rounding, saturation and the valid flag.
 #[test]
 fn a_small_circuit_is_proven() {
-    for flags in ["", "--clocks-per-frame 2", "--multipliers shift-add"] {
+    for flags in ["", "--clocks-per-frame 2"] {
         let desk = Desk::empty();
         let bank = bank_of_integers(vec![vec![3, -2, 1], vec![-5, 7, 0]], 4, 1, 2);
         desk.write("b.json", bank.to_json().unwrap());
@@ -296,10 +296,9 @@ fn random_banks_have_no_differing_bit_in_a_million_frames() {
         let fraction_bits = random.count(0, bits as usize + 3) as i32;
         write_bank(&desk, integers, bits, fraction_bits, ratio);
         let clocks = ["1", "2", "4", "8"][seed as usize % 4];
-        let multipliers = if clocks == "1" && seed % 8 == 0 { "shift-add" } else { "inferred" };
         let input = random.count(4, 16).to_string();
         let pipeline = random.count(1, 3).to_string();
-        let flags = ["--input-bits", &input, "--clocks-per-frame", clocks, "--multipliers", multipliers];
+        let flags = ["--input-bits", &input, "--clocks-per-frame", clocks];
         let more = ["--pipeline", &pipeline, "--random-frames", "1000000"];
         let report = exported(&desk, &[&flags[..], &more].concat());
         let line = [
@@ -361,8 +360,6 @@ fn verilog_that_cannot_be_is_refused() {
     }
     desk.good(&["design", "spec.toml", "-o", "b.json", "--bits", "8"]);
     desk.refused(1, &verilog("b.json"), &["no channel of the spec", "--input-bits B"]);
-    let shift_add = ["--input-bits", "8", "--clocks-per-frame", "2", "--multipliers", "shift-add"];
-    desk.refused(1, &more("b.json", &shift_add), &["ROM", "one clock"]);
     for name in ["wire", "1a", "a b"] {
         let flags = ["export", "b.json", "-o", "core.v", "--input-bits", "8", "--name", name];
         desk.refused(1, &flags, &[name, "Verilog identifier"]);

@@ -128,7 +128,7 @@ fn check(said: &str, what: &str) -> bool {
 }
 
 fn desk() -> Desk {
-    let desk = crate::work::desk(40);
+    let desk = crate::desk();
     let filter = |filter: &str| THESIS.replacen("delay = 0.6", &format!("delay = 0.6\nfilter = {filter}"), 1);
     desk.write("measured.toml", filter("{ touchstone = \"low.s2p\", order = 2 }"));
     desk.write("bode.toml", filter("{ response = \"bode.csv\", order = 2 }"));

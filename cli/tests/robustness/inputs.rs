@@ -33,7 +33,7 @@ const LOST: &str = r#"{"sample_start": 0, "global_index": 3}
 "#;
 
 fn desk() -> Desk {
-    let desk = crate::work::desk(40);
+    let desk = crate::desk();
     desk.write("spec.toml", THESIS);
     desk.report(&["design", "spec.toml", "-o", "designed.json"]);
     let raw: Vec<u8> = (0..320u32).map(|i| (i * 37 % 251) as u8).collect();

@@ -1,5 +1,4 @@
-//! Campaigns of random trials: killed runs, failing system calls, full disks, little memory, forged banks,
-//! damaged inputs, very large ones, and foreign text.
+//! Campaigns of random trials: forged banks, damaged inputs, and foreign text.
 //!
 //! Every run makes a short campaign with the same seeds.
 //! `HYBANK_CAMPAIGN=50 cargo test --release --test robustness -- --nocapture` makes 50 times as many trials;
@@ -8,26 +7,21 @@
 #[path = "../support/mod.rs"]
 mod support;
 
-#[cfg(unix)]
-#[path = "../../../tests/support/kills.rs"]
-mod kill_campaign;
-
-#[cfg(target_os = "linux")]
-mod disks;
 mod foreign;
 mod forged;
 mod inputs;
-#[cfg(unix)]
-mod kills;
-#[cfg(unix)]
-mod large;
-#[cfg(target_os = "linux")]
-mod memory;
 mod norm;
 mod parsers;
-#[cfg(target_os = "linux")]
-mod system_calls;
-#[cfg(unix)]
-mod times;
-#[cfg(unix)]
-mod work;
+
+use support::random::Random;
+use support::{Desk, THESIS, wav};
+
+/// Two recordings of forty samples, a spec and its bank.
+fn desk() -> Desk {
+    let desk = Desk::new();
+    desk.write("spec.toml", THESIS);
+    let mut dice = Random(18);
+    let mut noise = || (0..40).map(|_| dice.sample() as f32).collect::<Vec<_>>();
+    wav::write_pair(&desk, &noise(), &noise());
+    desk
+}

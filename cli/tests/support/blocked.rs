@@ -42,8 +42,18 @@ pub(crate) fn until_a_write_waits(process: u32, descriptor: Option<i32>) {
     until(|| tasks(process).into_iter().any(waits), "no write waits for its reader");
 }
 
-/// Waits until no thread of a process has a name any more.
-pub(crate) fn until_a_thread_ends(process: u32, name: &str) {
+fn has_thread(process: u32, name: &str) -> bool {
     let is_it = |task: PathBuf| fs::read_to_string(task.join("comm")).is_ok_and(|comm| comm.trim() == name);
-    until(|| !tasks(process).into_iter().any(is_it), "the thread goes on");
+    tasks(process).into_iter().any(is_it)
+}
+
+/// Waits until a process has a thread of this name.
+pub(crate) fn until_a_thread_begins(process: u32, name: &str) {
+    until(|| has_thread(process, name), "the thread does not begin");
+}
+
+/// Waits until a process has had a thread of this name, and has none any more.
+pub(crate) fn until_a_thread_has_ended(process: u32, name: &str) {
+    until_a_thread_begins(process, name);
+    until(|| !has_thread(process, name), "the thread goes on");
 }

@@ -5,8 +5,6 @@
 pub(crate) mod blocked;
 mod desk;
 pub(crate) mod forgery;
-#[path = "../../../tests/support/jobs.rs"]
-pub(crate) mod jobs;
 #[path = "../../../tests/support/random.rs"]
 pub(crate) mod random;
 pub(crate) mod schema;
@@ -39,11 +37,19 @@ taps = 22
 /// N = M = 2, m0 = 3.
 pub(crate) const TAPS: [&[f32]; 2] = [&[1.0, 2.0, 3.0, 4.0], &[10.0, 20.0, 30.0, 0.0]];
 
-/// Signals that end a run in order, without those that this process ignores, as under `nohup`: the runs that
-/// it starts ignore them too.
+/// The signals of Ctrl-C, of supervisors, of terminals that go, and of Ctrl-\\.
+pub(crate) const INT: u32 = 2;
+pub(crate) const TERM: u32 = 15;
+const HUP: u32 = 1;
+const QUIT: u32 = 3;
+
+/// Signals that end a run, without those that this process ignores, as under `nohup`: the runs that it
+/// starts ignore them too.
 pub(crate) fn ending_signals() -> impl Iterator<Item = u32> {
     let ignored = signals_of("self", "SigIgn:").unwrap_or(0);
-    jobs::ENDING.into_iter().filter(move |&signal| signal != jobs::HUP || ignored >> (signal - 1) & 1 == 0)
+    [INT, TERM, HUP, QUIT]
+        .into_iter()
+        .filter(move |&signal| signal != HUP || ignored >> (signal - 1) & 1 == 0)
 }
 
 /// Waits until the process handles `signal`.

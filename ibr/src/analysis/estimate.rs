@@ -127,14 +127,6 @@ pub trait Predicted: Viewpoint {
         spacing: f64,
     ) -> Result<Examined, RenderError>;
 
-    /// Refuses a prediction of a view for which there is too little memory.
-    fn check_memory(
-        &self,
-        views: &[View<'_, Self>],
-        size: (usize, usize),
-        settings: &RenderSettings,
-    ) -> Result<(), RenderError>;
-
     /// Mean distance between neighbouring views; of views at one point that from this camera, or one.
     fn spacing(&self, views: &[View<'_, Self>]) -> f64;
 }

@@ -48,16 +48,6 @@ impl Predicted for Camera {
         Ok(Examined { rendering, regressors })
     }
 
-    fn check_memory(
-        &self,
-        views: &[CalibratedView<'_>],
-        size: (usize, usize),
-        settings: &RenderSettings,
-    ) -> Result<(), RenderError> {
-        let extent = pipeline::extent(views, self, size, settings)?;
-        extent.check(extent.of_camera_prediction(settings))
-    }
-
     /// Mean distance between a view and the one nearest to it.
     fn spacing(&self, views: &[CalibratedView<'_>]) -> f64 {
         let distance = |i: usize| {

@@ -25,9 +25,6 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     /// # Errors
     /// Those of [`crate::pipeline`].
     pub fn new(views: &[View<'a, P>], settings: &RenderSettings) -> Result<Self, RenderError> {
-        if let Some(first) = views.first() {
-            first.camera.check_memory(views, first.image.size(), settings)?;
-        }
         let agreement = Agreement::of(views);
         let gains = if settings.keep_exposure { Vec::new() } else { without_drift(&agreement.gains) };
         let images = equalised(views, &gains);
@@ -63,7 +60,6 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     /// Those of [`crate::pipeline`].
     pub fn at(&self, camera: &P, size: (usize, usize)) -> Result<ViewError, RenderError> {
         let views = self.views();
-        camera.check_memory(&views, size, &self.study.settings)?;
         let examined = camera.examine(&views, size, &self.study, camera.spacing(&views))?;
         let local_limit = local_limits(&views, camera, &examined.rendering, self.study.noise);
         Ok(judge(examined, local_limit, self.calibration))

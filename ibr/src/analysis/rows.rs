@@ -62,16 +62,6 @@ impl Predicted for f64 {
         Ok(Examined { rendering, regressors })
     }
 
-    fn check_memory(
-        &self,
-        views: &[RectifiedView<'_>],
-        _: (usize, usize),
-        settings: &RenderSettings,
-    ) -> Result<(), RenderError> {
-        let extent = rectified::extent(views, settings);
-        extent.check(extent.of_rig_prediction())
-    }
-
     fn spacing(&self, views: &[RectifiedView<'_>]) -> f64 {
         let positions = || views.iter().map(|v| v.camera);
         let (low, high) = positions().fold((f64::MAX, f64::MIN), |(a, b), p| (a.min(p), b.max(p)));

@@ -70,9 +70,9 @@ pub(super) struct SceneArguments {
     /// Print the results as one JSON object.
     #[arg(long)]
     pub(super) json: bool,
-    /// Most pixels of the virtual view, and of each image and map. A rendering takes up to 160 bytes of
-    /// memory per pixel.
-    #[arg(long, value_name = "N", default_value_t = crate::image::MOST_PIXELS)]
+    /// Most pixels of the virtual view, and of each image and map, 268435456 at most. A rendering takes up
+    /// to 160 bytes of memory per pixel.
+    #[arg(long, value_name = "N", default_value_t = crate::image::MOST_PIXELS, value_parser = pixels)]
     pub(super) max_pixels: usize,
     /// Number of threads [default: all cores]. The result has the same bits for every number.
     #[arg(long, value_name = "N")]
@@ -292,6 +292,16 @@ pub(super) struct DemoArguments {
     pub(super) threads: Option<usize>,
 }
 
+/// The largest `--max-pixels`: a rendering of so many takes 40 GB.
+const LARGEST: usize = 1 << 28;
+
+fn pixels(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(count) if (1..=LARGEST).contains(&count) => Ok(count),
+        _ => Err(format!("it must be a whole number from 1 to {LARGEST}")),
+    }
+}
+
 /// Sides that the demo renders: enough for its shapes, and no more than a screen holds.
 const SIDES: std::ops::RangeInclusive<usize> = 64..=4096;
 
@@ -318,5 +328,7 @@ mod tests {
     fn sizes_are_checked() {
         assert_eq!(size("640x480"), Ok((640, 480)));
         assert!(size("640").is_err() && size("0x9").is_err() && size("9000x90").is_err());
+        assert_eq!(pixels("268435456"), Ok(LARGEST));
+        assert!(pixels("0").is_err() && pixels("268435457").is_err());
     }
 }

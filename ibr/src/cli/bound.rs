@@ -6,7 +6,6 @@ use super::output::{self, Encoded, Outputs, Part, check_files};
 use super::progress::Progress;
 use super::{heat, inputs};
 use crate::analysis::{Cause, Predicted, Predictor, Totals, ViewError};
-use crate::files::refuse_pixels_without_memory;
 use crate::image::{Image, Levels, quality};
 use crate::pipeline::{Agreement, RenderError, Watch};
 use crate::scene::{Kind, Scene, SourceView};
@@ -92,8 +91,6 @@ fn read(
 /// float map.
 fn map<'a>(predicted: &ViewError, path: &'a Path) -> Result<(Encoded<'a>, Option<f32>), Failure> {
     let size = predicted.rendering.image.size();
-    // A picture or three numbers per pixel, and the file.
-    refuse_pixels_without_memory(path, size, 36.0).map_err(failed)?;
     heat::encoded(&predicted.estimate, size, path, || {
         let pixels = predicted.local_limit.iter().zip(&predicted.expected).zip(&predicted.estimate);
         let data = pixels.flat_map(|((limit, expected), estimate)| [*limit, *expected, *estimate]).collect();

@@ -1,13 +1,12 @@
 //! `hybank-ibr demo`: a synthetic scene, rendered and compared with its exact view.
 
 use super::arguments::DemoArguments;
-use super::failure::{Failure, PROGRAM, failed, usage};
+use super::failure::{Failure, failed, usage};
 use super::output;
 use super::progress::Progress;
 use super::summary::Summary;
 use crate::camera::Camera;
 use crate::depth::DepthMap;
-use crate::files::refuse_pixels_without_memory;
 use crate::image::{Image, Levels, quality};
 use crate::partial::densify;
 use crate::pipeline::{RenderSettings, Rendering, rectified};
@@ -28,9 +27,6 @@ const GAP: usize = 6;
 /// Factor of the differences that it shows.
 const GAIN: f32 = 4.0;
 
-/// Bytes per pixel of a view: six pictures, the sheet of them, and its file.
-const SHEET: f64 = 300.0;
-
 #[derive(Debug, Serialize)]
 struct DemoSummary {
     /// Every pixel has its exact depth.
@@ -45,8 +41,6 @@ pub(super) fn run(arguments: &DemoArguments) -> Result<(), Failure> {
     if is_dash(&arguments.output) && arguments.json {
         return usage("-o - and --json both write to standard output; write the sheet to a file");
     }
-    PROGRAM.name_leftovers(&[&arguments.output]);
-    refuse_pixels_without_memory(&arguments.output, arguments.size, SHEET).map_err(failed)?;
     let progress = Progress::new(4);
     progress.step("drawing the scene");
     let (left, left_map) = view(0.0, arguments.size)?;

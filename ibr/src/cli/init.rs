@@ -15,7 +15,6 @@ pub(super) fn run(arguments: &InitArguments) -> Result<(), Failure> {
     let scene = scene::describe(&arguments.inputs, beside).map_err(failed)?;
     let (files, text) = (scene.spec.files(beside), scene.text().map_err(failed)?);
     output::refuse_overlaps(&[path], &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
-    PROGRAM.name_leftovers(&[path]);
     output::write(&[Encoded { bytes: text.into_bytes(), path }], arguments.force)?;
     if !is_dash(path) {
         let (shown, views) = (Quoted(path), scene.spec.view.len());

@@ -15,21 +15,17 @@ mod source;
 mod summary;
 
 use arguments::{Arguments, Command};
-use failure::{Failure, PROGRAM, failed, usage};
-use hybank::memory::{affordable_threads, check_memory};
+use failure::{Failure, PROGRAM, usage};
+use hybank::program::interrupts;
 use std::process::ExitCode;
 
 /// More threads than cores would only use memory for stacks.
 const MOST_THREADS: usize = 1024;
 
-/// Bytes of memory that every command takes beside what it counts.
-const LEAST_MEMORY: f64 = 24e6;
-
 /// Reads the arguments, runs the command and maps its outcome to an exit code: 0 success, 1 input error, 2
 /// usage error.
 pub fn run() -> ExitCode {
-    #[cfg(unix)]
-    hybank::files::fail_at_file_size_limit();
+    interrupts::handle();
     let arguments = match hybank::messages::arguments::<Arguments>() {
         Ok(arguments) => arguments,
         Err(message) => return PROGRAM.show(&message),
@@ -44,25 +40,12 @@ pub fn run() -> ExitCode {
     PROGRAM.end(outcome)
 }
 
-/// Runs the work on the given number of threads, by default on all cores; on fewer where addresses are
-/// limited, and on this thread if that leaves one or none can be started.
+/// Runs the work on the given number of threads, by default on all cores.
 fn in_pool(threads: Option<usize>, work: impl FnOnce() -> Result<(), Failure> + Send) -> Result<(), Failure> {
-    if threads.is_some_and(|threads| !(1..=MOST_THREADS).contains(&threads)) {
-        let threads = threads.unwrap_or_default();
-        return usage(format!("--threads {threads}: it must be 1 to {MOST_THREADS}"));
+    let count = threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
+    if !(1..=MOST_THREADS).contains(&count) {
+        return usage(format!("--threads {count}: it must be 1 to {MOST_THREADS}"));
     }
-    let builder = rayon::ThreadPoolBuilder::new;
-    let alone = || builder().num_threads(1).use_current_thread().build().map_err(failed);
-    let several = |count| builder().num_threads(count).build();
-    let pool = match (affordable_threads(threads), threads) {
-        (1, _) => alone(),
-        (count, Some(threads)) => several(count)
-            .map_err(|error| Failure::Input(format!("--threads {threads}: {error}; ask for fewer"))),
-        (count, None) => several(count).or_else(|_| alone()),
-    }?;
-    // With the stacks of the threads, which are in use now. An allocation of text or a small table that
-    // fails would end the process.
-    let refused = |shortage| format!("every command takes {shortage}; allow more, or use --threads 1");
-    check_memory(LEAST_MEMORY).map_err(|shortage| failed(refused(shortage)))?;
-    pool.install(work)
+    let refused = |error| Failure::Input(format!("--threads {count}: {error}; ask for fewer"));
+    rayon::ThreadPoolBuilder::new().num_threads(count).build().map_err(refused)?.install(work)
 }

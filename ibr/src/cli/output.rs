@@ -1,7 +1,7 @@
 //! Results: the files that a command writes, which are not overwritten by accident, and standard output.
 
 use super::arguments::SceneArguments;
-use super::failure::{Failure, PROGRAM, failed, usage};
+use super::failure::{Failure, failed, usage};
 use super::source::Source;
 use crate::image::{self, Image, Levels};
 use hybank::files::{AtomicFile, FileError, check_output, commit_all};
@@ -57,8 +57,6 @@ pub(super) fn write(outputs: &[Encoded<'_>], force: bool) -> Result<(), Failure>
 /// closed: a long path has more than a process may have open.
 pub(super) fn begin(outputs: &[Encoded<'_>], force: bool) -> Result<Vec<AtomicFile>, Failure> {
     let (to_output, to_files): (Vec<_>, Vec<_>) = outputs.iter().partition(|e| is_dash(e.path));
-    #[cfg(unix)]
-    hybank::files::remove_unfinished_on_signals();
     let files = to_files.iter().map(|e| image::begin(&e.bytes, e.path, force));
     let mut files = files.collect::<Result<Vec<_>, _>>().map_err(failed)?;
     files.iter_mut().try_for_each(AtomicFile::seal).map_err(failed)?;
@@ -212,8 +210,7 @@ impl Outputs {
     }
 }
 
-/// Refuses files that exist, are one, or are an input, before the views of the scene are read; names what
-/// killed runs left beside them.
+/// Refuses files that exist, are one, or are an input, before the views of the scene are read.
 pub(super) fn check_files(
     all: &[Outputs],
     film: Option<&Path>,
@@ -225,6 +222,5 @@ pub(super) fn check_files(
     let of_scene = source.files();
     let inputs: Vec<&Path> = of_scene.iter().chain(&scene.truth).map(PathBuf::as_path).collect();
     refuse_overlaps(&files, &inputs)?;
-    PROGRAM.name_leftovers(&files);
     files.iter().try_for_each(|file| refuse_existing(file, force))
 }

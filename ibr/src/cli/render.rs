@@ -9,7 +9,6 @@ use super::failure::{Failure, PROGRAM, failed, of_view, usage};
 use super::output::{self, Outputs, check_files};
 use super::progress::Progress;
 use super::summary::Summary;
-use crate::files::refuse_pixels_without_memory;
 use crate::image::{Image, quality};
 use crate::pipeline::uncalibrated::UncalibratedSettings;
 use crate::pipeline::{Method, Rendering, Watch, calibrated, rectified, uncalibrated};
@@ -181,8 +180,6 @@ fn render(
 fn compare(summary: &mut Summary, done: &Rendered, truth: &Image, path: &Path) -> Result<(), Failure> {
     let named = |e: &dyn std::fmt::Display| Failure::Input(format!("{}: {e}", Quoted(path)));
     let image = &done.rendering.image;
-    // Both are rounded.
-    refuse_pixels_without_memory(path, image.size(), 24.0).map_err(failed)?;
     let whole = quality::compare(image, truth, None).map_err(|e| named(&e))?;
     let Some(hull) = &done.hull else {
         whole.iter().for_each(|q| summary.compare(q));

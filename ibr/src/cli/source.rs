@@ -7,7 +7,6 @@ use crate::files;
 use crate::image::{Image, read_image};
 use crate::pipeline::{RenderSettings, Watch};
 use crate::scene::{self, Kind, LoadOptions, Scene, SceneSpec};
-use hybank::files::StandardStream;
 use hybank::messages::Quoted;
 use hybank::program::is_dash;
 use std::path::{Path, PathBuf};
@@ -97,7 +96,6 @@ fn spec(path: &Path) -> Result<(PathBuf, SceneSpec), Failure> {
     };
     if is_dash(path) {
         let name = "standard input";
-        StandardStream::Input.check().map_err(|error| Failure::Input(format!("{name}: {error}")))?;
         let text = files::text(std::io::stdin().lock(), name).map_err(failed)?;
         return parsed(&text, PathBuf::from("<stdin>"));
     }
@@ -111,7 +109,7 @@ fn spec(path: &Path) -> Result<(PathBuf, SceneSpec), Failure> {
         PROGRAM.say_line(&format!("note: the scene of this folder is {}", Quoted(&own)));
         return spec(&own);
     }
-    let text = files::read_text(path, "check the path").map_err(failed)?;
+    let text = files::read_scene(path).map_err(failed)?;
     parsed(&text, path.to_owned())
 }
 

@@ -2,7 +2,7 @@
 
 use super::dynamic::{Levels, picture};
 use super::{Image, pfm};
-use crate::files::{InputError, refuse_pixels_without_memory};
+use crate::files::InputError;
 use hybank::files::AtomicFile;
 use image::{DynamicImage, ImageFormat};
 use std::io::{Cursor, Write};
@@ -21,8 +21,6 @@ pub fn encode(image: &Image, path: &Path, levels: Levels) -> Result<Vec<u8>, Inp
         "jpg" | "jpeg" => ImageFormat::Jpeg,
         "ppm" | "pgm" | "pnm" => ImageFormat::Pnm,
         "pfm" => {
-            let room = 12.0 * image.channels() as f64;
-            refuse_pixels_without_memory(path, image.size(), room)?;
             let values = image.data().iter().map(|v| v / 255.0).collect();
             return Ok(pfm::encode(&Image { data: values, ..*image }));
         }
@@ -35,20 +33,12 @@ pub fn encode(image: &Image, path: &Path, levels: Levels) -> Result<Vec<u8>, Inp
         let reason = "16 bits per value are written to .png files only; .pfm files have floats";
         return Err(InputError::file(path, reason));
     }
-    refuse_pixels_without_memory(path, image.size(), packing(image.channels(), levels))?;
     // A .ppm is always written in colour, a .pgm in grey.
     match ending.as_str() {
         "ppm" => write_picture(&image.to_rgb().to_dynamic(levels), format, path),
         "pgm" => write_picture(&image.to_grey().to_dynamic(levels), format, path),
         _ => write_picture(&image.to_dynamic(levels), format, path),
     }
-}
-
-/// Bytes per pixel while a picture is packed: the picture, what the encoder makes of it in pieces that
-/// double, and the file.
-fn packing(channels: usize, levels: Levels) -> f64 {
-    let bytes = if levels == Levels::Sixteen { 2 } else { 1 };
-    (6 * bytes * channels.max(3)) as f64
 }
 
 /// Writes the image to a file that appears only when it is whole, in the place of one that exists.
@@ -86,7 +76,6 @@ pub fn encode_with_alpha(
         let (expected, given) = (width * height, alpha.len());
         return Err(InputError::Buffer { width, height, channels: 1, expected, given });
     }
-    refuse_pixels_without_memory(path, image.size(), packing(image.channels() + 1, levels))?;
     let pixels = image.data().chunks_exact(image.channels()).zip(alpha);
     let values = pixels.flat_map(|(pixel, alpha)| pixel.iter().copied().chain([255.0 * alpha]));
     let picture = picture(values, image.size(), image.channels() + 1, levels);

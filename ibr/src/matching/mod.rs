@@ -14,7 +14,6 @@ use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::propagate::Viewpoint;
 use census::Costs;
-use hybank::memory::{MemoryShortage, check_memory};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -37,9 +36,6 @@ pub enum MatchError {
     /// Hardly any point was found in two photographs.
     #[error("photograph {} and those beside it show hardly any common point; are they rectified, and are the cameras right?", .0 + 1)]
     Unlike(usize),
-    /// There is too little memory.
-    #[error("to match the photographs takes {0}; shrink them")]
-    Memory(MemoryShortage),
 }
 
 /// Other photographs with which each one is matched: the nearest.
@@ -63,9 +59,6 @@ const LEAST_SHARE: f64 = 0.3;
 /// Rows that are matched together, and rows beyond them where paths begin.
 const ROWS: usize = 96;
 const LEAD: usize = 24;
-
-/// Bytes per hypothesis of a pixel: a cost and a sum.
-const BYTES: f64 = 3.0;
 
 struct Sweep<P> {
     camera: P,
@@ -105,9 +98,6 @@ pub fn depths<P: Viewpoint>(
 
 /// The parallaxes of all photographs, NaN where no other one has the same at the point.
 fn matched<P: Viewpoint>(sweeps: &[Sweep<P>]) -> Result<Vec<Vec<f32>>, MatchError> {
-    let cells = |sweep: &Sweep<P>| (sweep.grey.width() * (ROWS + 2 * LEAD) * sweep.range.len()) as f64;
-    let most = sweeps.iter().map(cells).fold(0.0, f64::max);
-    check_memory(BYTES * most * rayon::current_num_threads() as f64).map_err(MatchError::Memory)?;
     let found: Vec<Vec<f32>> = sweeps.iter().map(|sweep| sweep.parallaxes(sweeps)).collect();
     let confirmed = (0..sweeps.len()).map(|k| {
         let values = sweeps[k].confirmed(sweeps, &found, k);

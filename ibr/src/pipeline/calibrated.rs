@@ -1,6 +1,5 @@
 //! A view from any number of calibrated cameras with depth.
 
-use super::memory::{Extent, bands_of};
 use super::{
     Agreement, Method, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch, check_counts,
     check_size,
@@ -17,6 +16,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Share of the first two stages in the work, about.
 const GATHERING: f64 = 0.7;
+/// Samples held in memory at a time; larger scenes are rendered in bands of rows.
+const SAMPLES_AT_A_TIME: usize = 1 << 16;
+/// Fewest rows of a band, however many samples they have: neighbouring bands share some rows, whose samples
+/// are made twice.
+const FEWEST_ROWS: usize = 40;
 
 /// Renders the view of `camera` with `width` x `height` pixels.
 ///
@@ -42,8 +46,7 @@ pub fn render_watched(
     settings: &RenderSettings,
     watch: Watch<'_>,
 ) -> Result<Rendering, RenderError> {
-    let extent = extent(views, camera, size, settings)?;
-    extent.check(extent.of_cameras(settings))?;
+    check(views, size, settings)?;
     let colour = views.iter().any(|v| v.image.channels() == 3);
     match (settings.interpolation.plane.degree, colour) {
         (Degree::Linear, false) => render_with::<2, 1>(views, camera, size, settings, watch),
@@ -51,25 +54,6 @@ pub fn render_watched(
         (Degree::Cubic, false) => render_with::<4, 1>(views, camera, size, settings, watch),
         (Degree::Cubic, true) => render_with::<4, 3>(views, camera, size, settings, watch),
     }
-}
-
-/// The sizes of the view of `camera` with `size` pixels between others.
-///
-/// # Errors
-/// [`RenderError`] about inputs that cannot be rendered.
-pub fn extent(
-    views: &[CalibratedView<'_>],
-    camera: &Camera,
-    size: (usize, usize),
-    settings: &RenderSettings,
-) -> Result<Extent, RenderError> {
-    check(views, size, settings)?;
-    let images: Vec<_> = views.iter().map(|view| view.image).collect();
-    let all = Extent::new(size, &images, settings.nearest);
-    let chosen = view_weights(views, camera, settings).views();
-    let footprint =
-        Footprint::of(views, &chosen, camera, &Frame::whole(size.0, size.1, 0.5, settings.offset));
-    Ok(Extent { samples: footprint.most_samples().min(all.pixels), ..all })
 }
 
 fn view_weights(views: &[CalibratedView<'_>], camera: &Camera, settings: &RenderSettings) -> ViewWeights {
@@ -92,6 +76,11 @@ fn check(
     }
     let mut all = views.iter().enumerate();
     all.try_for_each(|(view, v)| check_size(view, "the depth map", v.map.size(), v.image.size()))
+}
+
+/// Bands of rows for views of so many pixels in all.
+fn bands_of(pixels: usize, height: usize) -> usize {
+    pixels.div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS)).max(1)
 }
 
 fn render_with<const ORDER: usize, const C: usize>(

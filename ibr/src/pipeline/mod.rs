@@ -4,7 +4,6 @@ mod agreement;
 pub mod calibrated;
 pub(crate) mod depth_errors;
 mod exposure;
-pub mod memory;
 pub mod rectified;
 mod smoothing;
 pub mod uncalibrated;
@@ -25,7 +24,6 @@ use crate::interpolate::{Cover, HoleCount, Settings};
 use crate::occlusion::DepthTest;
 use crate::sample::Dropped;
 use crate::setting::{FINITE, POSITIVE, SettingError};
-use hybank::memory::MemoryShortage;
 
 /// The method of the third stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -92,19 +90,6 @@ pub enum RenderError {
         views: usize,
         /// Pixels of the largest.
         pixels: usize,
-    },
-    /// The work takes more memory than this process may use.
-    #[error(
-        "the virtual view of {} x {} pixels from {views} views takes {shortage}; shrink the images or the view, or use fewer views",
-        size.0, size.1
-    )]
-    Memory {
-        /// Width and height of the virtual view.
-        size: (usize, usize),
-        /// Views that are used.
-        views: usize,
-        /// What the work takes, and what there is.
-        shortage: MemoryShortage,
     },
     /// Views of different sizes in a rectified rig, or a map of another size than its image.
     #[error("view {view}: {what} has {} x {} pixels instead of {} x {}", size.0, size.1, expected.0, expected.1)]

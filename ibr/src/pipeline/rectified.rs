@@ -1,6 +1,5 @@
 //! A view from a rectified rig: the three stages run row by row, rows in parallel.
 
-use super::memory::Extent;
 use super::{
     Agreement, Method, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch, check_counts,
     check_size,
@@ -44,8 +43,6 @@ pub fn render_watched(
 ) -> Result<Rendering, RenderError> {
     check(views, position)?;
     settings.check()?;
-    let extent = extent(views, settings);
-    extent.check(extent.of_rig(settings))?;
     let colour = views.iter().any(|v| v.image.channels() == 3);
     match colour {
         false => render_with::<1>(views, position, settings, watch),
@@ -63,12 +60,6 @@ fn check(views: &[RectifiedView<'_>], position: f64) -> Result<(), RenderError> 
     }
     let positions = views.iter().map(|v| v.camera).chain([position]);
     positions.into_iter().try_for_each(|position| Ok(FINITE.check("position", position)?))
-}
-
-pub(crate) fn extent(views: &[RectifiedView<'_>], settings: &RenderSettings) -> Extent {
-    let images: Vec<&Image> = views.iter().map(|view| view.image).collect();
-    let size = images.first().map_or((0, 0), |image| image.size());
-    Extent::new(size, &images, settings.nearest)
 }
 
 pub(crate) struct Job<'a> {

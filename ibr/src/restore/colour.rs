@@ -4,28 +4,17 @@ use super::outliers::Parallax;
 use crate::depth::FAR;
 use crate::image::Image;
 use crate::propagate::{View, Viewpoint};
-use hybank::memory::{MemoryShortage, check_memory};
 use rayon::prelude::*;
 
 /// Below this mean value a pixel has no colour to take.
 const DARK: f32 = 4.0;
 
-/// Bytes per pixel of all views: the three values of a photograph that was grey; the parallaxes of another
-/// one are fewer.
-const BYTES: f64 = 12.0;
-
 /// The grey photographs of views in colour, `None` for coloured ones and where all are grey. A pixel has the
 /// ratio of red, green and blue that the first of the coloured views shows at the point of its depth, and
 /// stays grey where none shows that point.
-///
-/// # Errors
-/// [`MemoryShortage`].
-pub fn coloured<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Option<Image>>, MemoryShortage> {
+pub fn coloured<P: Viewpoint>(views: &[View<'_, P>]) -> Vec<Option<Image>> {
     let coloured: Vec<usize> = (0..views.len()).filter(|i| views[*i].image.channels() == 3).collect();
     let is_grey = |view: &View<'_, P>| view.image.channels() != 3 && !coloured.is_empty();
-    if views.iter().any(is_grey) {
-        check_memory(BYTES * views.iter().map(|view| view.map.data().len() as f64).sum::<f64>())?;
-    }
     let planes: Vec<Option<Parallax>> =
         views.iter().map(|view| (!is_grey(view)).then(|| Parallax::of(view.map, 0.0))).collect();
     let in_colour = |view: &View<'_, P>| {
@@ -48,5 +37,5 @@ pub fn coloured<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Option<Image>
         let values: Vec<[f32; 3]> = (0..view.map.data().len()).into_par_iter().map(colour).collect();
         Image::from_values(view.image.size(), 3, values.into_flattened())
     };
-    Ok(views.iter().map(|view| is_grey(view).then(|| in_colour(view))).collect())
+    views.iter().map(|view| is_grey(view).then(|| in_colour(view))).collect()
 }

@@ -20,9 +20,7 @@ pub(crate) use scattered::dense;
 pub(crate) use surface::from_scattered;
 
 use crate::depth::{DepthMap, Measure};
-use crate::interpolate::plane::surface_memory;
 use crate::propagate::{View, Viewpoint, nearest};
-use hybank::memory::{MemoryShortage, check_memory};
 use outliers::Known;
 
 /// A map that was restored.
@@ -41,23 +39,8 @@ pub struct Restored {
 /// position within a pixel.
 const NOTICEABLE: f64 = 0.02 / 12.0;
 
-/// Bytes that maps of these widths and heights take while they are restored, with noise that is smoothed or
-/// without.
-pub fn memory(sizes: &[(usize, usize)], is_noisy: bool) -> f64 {
-    let pixels = |size: &(usize, usize)| size.0 as f64 * size.1 as f64;
-    let largest = sizes.iter().copied().max_by(|a, b| pixels(a).total_cmp(&pixels(b))).unwrap_or((0, 0));
-    let smoothed = if is_noisy { surface_memory(largest.0, largest.1) } else { 0.0 };
-    // Points that are compared; parallaxes and restored maps of all views; parallaxes and marks of one.
-    5e5 + 8.0 * sizes.iter().map(pixels).sum::<f64>() + 5.0 * pixels(&largest) + smoothed
-}
-
 /// Restores the maps of views that see one scene.
-///
-/// # Errors
-/// [`MemoryShortage`]; maps without noise take much less than others.
-pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, MemoryShortage> {
-    let sizes: Vec<(usize, usize)> = views.iter().map(|view| view.map.size()).collect();
-    check_memory(memory(&sizes, false))?;
+pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Vec<Restored> {
     let all = Known::of(views);
     let one = |i: usize| {
         let (view, error, rejected) = (&views[i], all.agreement.depth_error(i), all.rejected(i));
@@ -66,13 +49,12 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Restored>, Mem
             plane.replace(view.image, &rejected);
         }
         if is_noticeable(views, i, error) {
-            check_memory(surface_memory(view.map.width(), view.map.height()))?;
             plane.smooth(view.image, view.map.measure());
         }
         let known = (plane.values.len() - view.map.unknown()).max(1);
         let replaced = if count > 0 { rejected } else { Vec::new() };
         let map = plane.into_map(view.map, replaced);
-        Ok(Restored { map, outliers: count as f64 / known as f64, error })
+        Restored { map, outliers: count as f64 / known as f64, error }
     };
     (0..views.len()).map(one).collect()
 }

@@ -4,28 +4,20 @@ use super::outliers::Known;
 use super::surface::{from_scattered, nearest};
 use crate::depth::DepthMap;
 use crate::propagate::{View, Viewpoint};
-use hybank::memory::{MemoryShortage, check_memory};
 use rayon::prelude::*;
 
 /// Radius of the ring on which a sample is compared with others, in mean distances of samples.
 const RING: f64 = 2.0;
 
-/// Bytes per pixel of all views: rough maps with their parallaxes, and samples.
-const HELD: f64 = 20.0;
-
-/// Bytes per pixel of a map that is made dense.
-const DENSE: f64 = 110.0;
-
 /// The maps of views made dense where their values are scattered, `None` where they are not.
 ///
 /// Every pixel takes the value of its nearest sample at first. By these rough maps the views vote on the
 /// samples. What is left, with those samples of the other views that a view shows, gives its surfaces.
-pub(crate) fn dense<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Option<DepthMap>>, MemoryShortage> {
+pub(crate) fn dense<P: Viewpoint>(views: &[View<'_, P>]) -> Vec<Option<DepthMap>> {
     let is_scattered: Vec<bool> = views.par_iter().map(|view| view.map.is_scattered()).collect();
     if !is_scattered.contains(&true) {
-        return Ok(vec![None; views.len()]);
+        return vec![None; views.len()];
     }
-    check_memory(HELD * views.iter().map(|view| view.map.data().len() as f64).sum::<f64>())?;
     let rough: Vec<Option<DepthMap>> =
         views.par_iter().zip(&is_scattered).map(|(view, is)| is.then(|| rough(view))).collect();
     let maps = views.iter().zip(&rough).map(|(view, rough)| rough.as_ref().unwrap_or(view.map));
@@ -36,15 +28,9 @@ pub(crate) fn dense<P: Viewpoint>(views: &[View<'_, P>]) -> Result<Vec<Option<De
         .map(|i| if is_scattered[i] { sound(&known, views[i].map, i) } else { views[i].map.clone() })
         .collect();
     let surface = |i: usize| {
-        let image = views[i].image;
-        check_memory(DENSE * image.width() as f64 * image.height() as f64)?;
-        Ok(is_scattered[i].then(|| from_scattered(&shared(&known, &shown, &samples, i), image)))
+        is_scattered[i].then(|| from_scattered(&shared(&known, &shown, &samples, i), views[i].image))
     };
-    let most = views.iter().map(|view| view.map.data().len()).max().unwrap_or(0) as f64;
-    match check_memory(DENSE * most * rayon::current_num_threads().min(views.len()) as f64) {
-        Ok(()) => (0..views.len()).into_par_iter().map(surface).collect(),
-        Err(_) => (0..views.len()).map(surface).collect(),
-    }
+    (0..views.len()).into_par_iter().map(surface).collect()
 }
 
 /// The map with the value of the nearest sample at each pixel.

@@ -34,7 +34,7 @@ fn changed(map: &DepthMap, seed: u64, change: impl Fn(f32, &mut Dice) -> f32) ->
 /// The restored disparities of both views.
 fn restored(shots: &[Shot; 2], maps: &[DepthMap; 2]) -> Vec<Restored> {
     let view = |i: usize| View { image: &shots[i].image, map: &maps[i], camera: i as f64 };
-    restore(&[view(0), view(1)]).unwrap()
+    restore(&[view(0), view(1)])
 }
 
 /// Root mean square error, without the largest hundredth: outlines.
@@ -114,8 +114,8 @@ fn wrong_samples_are_left_out_of_dense_maps() {
             })
         });
         let view = |i: usize| View { image: &shots[i].image, map: &maps[i], camera: i as f64 };
-        let together = dense(&[view(0), view(1)]).unwrap();
-        let alone = [0, 1].map(|i| dense(&[view(i)]).unwrap().remove(0));
+        let together = dense(&[view(0), view(1)]);
+        let alone = [0, 1].map(|i| dense(&[view(i)]).remove(0));
         [&together[..], &alone[..]].map(|maps| {
             [0, 1]
                 .map(|i| error(maps[i].as_ref().expect("a dense map"), &shots[i].disparity))
@@ -140,7 +140,7 @@ fn depths_far_from_samples_are_guesses() {
     let map = of(map.data().iter().map(|v| 100.0 / v).collect());
     let guessed = |map: &DepthMap, from: usize, to: usize| {
         let view = View { image: &shots[0].image, map, camera: 0.0 };
-        let dense = dense(&[view]).unwrap().remove(0).unwrap();
+        let dense = dense(&[view]).remove(0).unwrap();
         let pixels = || (0..SIZE.0 * SIZE.1).filter(|p| (from..to).contains(&(p % SIZE.0)));
         pixels().filter(|p| dense.is_guessed(*p)).count() as f64 / pixels().count() as f64
     };
@@ -157,7 +157,7 @@ fn outliers_of_depths_are_found() {
     };
     let maps = [0, 1].map(|i| changed(&shots[i].depth, 5 + i as u64, wild));
     let view = |i: usize| View { image: &shots[i].image, map: &maps[i], camera: shots[i].camera };
-    for (restored, shot) in restore(&[view(0), view(1)]).unwrap().iter().zip(&shots) {
+    for (restored, shot) in restore(&[view(0), view(1)]).iter().zip(&shots) {
         let left = error(&restored.map, &shot.depth);
         assert!((0.03..0.055).contains(&restored.outliers) && left < 0.05, "{} {left}", restored.outliers);
     }
@@ -195,7 +195,7 @@ fn thin_things_are_kept() {
         Image::new(SIZE.0, SIZE.1, 1, data.collect()).unwrap()
     });
     let view = |i: usize| View { image: &image[i], map: &thin[i], camera: i as f64 };
-    for (restored, map) in restore(&[view(0), view(1)]).unwrap().iter().zip(&thin) {
+    for (restored, map) in restore(&[view(0), view(1)]).iter().zip(&thin) {
         assert!(restored.map == *map, "{}", restored.outliers);
     }
 }

@@ -21,7 +21,6 @@ use crate::files::InputError;
 use crate::image::{Image, MOST_PIXELS, read_image};
 use crate::pipeline::Watch;
 use goals::Goal;
-use hybank::memory::check_memory;
 use hybank::messages::{self, Number, Quoted, of_document};
 use left_out::LeftOut;
 use models::Models;
@@ -123,9 +122,8 @@ impl Loader<'_> {
         let Preparation { filled, outliers, coloured } = match &mut kind {
             Kind::Rectified { views, .. } => prepare(views, self.options.fill),
             Kind::Calibrated { views, .. } => prepare(views, self.options.fill),
-            Kind::Uncalibrated { .. } => Ok(Preparation::default()),
-        }
-        .map_err(|shortage| self.incomplete(shortage))?;
+            Kind::Uncalibrated { .. } => Preparation::default(),
+        };
         notes.extend(note_of_outliers(&outliers));
         notes.extend(note_of_grey(&coloured));
         let names = views.iter().map(|view| view.label()).collect();
@@ -234,39 +232,20 @@ fn note_of_grey(views: &[usize]) -> Option<String> {
     })
 }
 
-/// Bytes per pixel of a view that is being read, at most.
-const LOADING_BYTES: f64 = 110.0;
-
-/// Bytes per pixel of a view that is there.
-const VIEW_BYTES: f64 = 20.0;
-
 /// What `read` makes of each view, or the first error in the order of the views, so that every run reports
-/// the same error. Views are read at the same time if there is memory for that, judged by the first one.
+/// the same error.
 fn each<V: Sync, T: Send>(
     views: &[V],
     read: impl Fn(&V) -> Loaded<T> + Sync,
-    pixels: impl Fn(&T) -> usize,
     watch: Watch<'_>,
 ) -> Loaded<Vec<T>> {
-    let Some((first, others)) = views.split_first() else { return Ok(Vec::new()) };
     let ready = AtomicUsize::new(0);
     let read = |view: &V| {
         let done = read(view);
         watch((ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / views.len() as f64);
         done
     };
-    let first = read(first)?;
-    let at_a_time = rayon::current_num_threads().min(others.len()) as f64;
-    let bytes = pixels(&first) as f64 * (VIEW_BYTES * others.len() as f64 + LOADING_BYTES * at_a_time);
-    let read: Vec<Loaded<T>> = match check_memory(bytes) {
-        Ok(()) => others.par_iter().map(read).collect(),
-        Err(_) => others.iter().map(read).collect(),
-    };
-    std::iter::once(Ok(first)).chain(read).collect()
-}
-
-fn pixels(image: &Image) -> usize {
-    image.width() * image.height()
+    views.par_iter().map(read).collect::<Vec<_>>().into_iter().collect()
 }
 
 #[cfg(test)]

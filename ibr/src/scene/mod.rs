@@ -7,7 +7,7 @@ mod spec;
 
 pub use folder::{Described, describe};
 pub use load::{LoadOptions, MOST_FRAMES, complete, load, parse};
-pub use prepare::{Preparation, PreparationError, prepare};
+pub use prepare::{Preparation, prepare};
 pub use spec::{SceneSpec, TargetSpec, ViewSpec};
 
 use crate::camera::Camera;

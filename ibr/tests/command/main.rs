@@ -20,8 +20,6 @@ mod place;
 mod readme;
 mod refuse;
 mod render;
-#[cfg(unix)]
-mod support;
 
 const SIZE: (usize, usize) = (120, 90);
 

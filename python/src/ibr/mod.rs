@@ -63,12 +63,9 @@ fn rendered<'py, P: Viewpoint + 'static>(
     fill: bool,
     render: impl FnOnce(&[View<'_, P>]) -> Result<Rendering, RenderError> + Send + 'static,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let run = move |_: &_| match prepare(&mut views, fill) {
-        Ok(_) => {
-            let views: Vec<_> = views.iter().map(SourceView::view).collect();
-            render(&views).map_err(|e| e.to_string())
-        }
-        Err(shortage) => Err(shortage.to_string()),
+    let run = move |_: &_| {
+        prepare(&mut views, fill);
+        render(&views.iter().map(SourceView::view).collect::<Vec<_>>()).map_err(|e| e.to_string())
     };
     made(py, &background::run(py, None, run)?.map_err(refused)?, None, None)
 }

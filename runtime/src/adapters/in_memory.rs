@@ -1,6 +1,6 @@
 //! Samples in memory, frame after frame or channel after channel.
 
-use super::{Input, MOST_ROWS, Output, SplitOutput, convert, interleave_rows};
+use super::{Halves, Input, MOST_ROWS, Output, SplitOutput, convert, interleave_rows};
 use crate::sample::{same, same_mut};
 use crate::{Isa, ProcessError, Sample};
 use std::ops::Range;
@@ -35,7 +35,11 @@ impl<S: Sample> Input for Interleaved<'_, S> {
         self.frames
     }
 
-    fn in_memory<T: Sample>(&self) -> Option<&[T]> {
+    fn in_memory_f32(&self) -> Option<&[f32]> {
+        same(self.samples)
+    }
+
+    fn in_memory_f64(&self) -> Option<&[f64]> {
         same(self.samples)
     }
 
@@ -44,35 +48,41 @@ impl<S: Sample> Input for Interleaved<'_, S> {
         samples.iter().all(|sample| sample.to_f64().is_finite())
     }
 
-    fn load<T: Sample>(&self, _: Isa, first: usize, samples: &mut [T]) {
+    fn load_f32(&self, _: Isa, first: usize, samples: &mut [f32]) {
+        convert(&self.samples[first * self.channels..][..samples.len()], samples);
+    }
+
+    fn load_f64(&self, _: Isa, first: usize, samples: &mut [f64]) {
         convert(&self.samples[first * self.channels..][..samples.len()], samples);
     }
 }
 
-impl<S: Sample> Output for [S] {
+impl<S: Sample> Output for &mut [S] {
     fn capacity(&self) -> usize {
         self.len()
     }
 
-    fn slots<T: Sample>(&mut self, samples: Range<usize>) -> Option<&mut [T]> {
+    fn slots_f32(&mut self, samples: Range<usize>) -> Option<&mut [f32]> {
         same_mut(&mut self[samples])
     }
 
-    fn store<T: Sample>(&mut self, _: Isa, first: usize, samples: &[T]) {
+    fn slots_f64(&mut self, samples: Range<usize>) -> Option<&mut [f64]> {
+        same_mut(&mut self[samples])
+    }
+
+    fn store_f32(&mut self, _: Isa, first: usize, samples: &[f32]) {
+        convert(samples, &mut self[first..first + samples.len()]);
+    }
+
+    fn store_f64(&mut self, _: Isa, first: usize, samples: &[f64]) {
         convert(samples, &mut self[first..first + samples.len()]);
     }
 }
 
-impl<S: Sample> SplitOutput for [S] {
-    type Half<'h> = [S];
-
-    fn halves<'h, R>(
-        &'h mut self,
-        samples: usize,
-        with: impl FnOnce(&mut Self::Half<'h>, &mut Self::Half<'h>) -> R,
-    ) -> R {
-        let (earlier, later) = self.split_at_mut(samples);
-        with(earlier, later)
+impl<S: Sample> SplitOutput for &mut [S] {
+    fn halves(&mut self, samples: usize, with: Halves<'_>) {
+        let (mut earlier, mut later) = self.split_at_mut(samples);
+        with(&mut earlier, &mut later);
     }
 }
 
@@ -97,6 +107,20 @@ impl<'a, S: Sample> Planar<'a, S> {
             None => Ok(Self { channels, frames }),
         }
     }
+
+    /// One channel is interleaved as it lies.
+    fn alone(&self) -> Option<&[S]> {
+        if let [alone] = self.channels { Some(alone) } else { None }
+    }
+
+    /// Frames sample by sample.
+    fn load_each<T: Sample>(&self, first: usize, samples: &mut [T]) {
+        for (k, frame) in (first..).zip(samples.chunks_exact_mut(self.channels.len())) {
+            for (slot, channel) in frame.iter_mut().zip(self.channels) {
+                *slot = T::from_f64(channel[k].to_f64());
+            }
+        }
+    }
 }
 
 impl<S: Sample> Input for Planar<'_, S> {
@@ -108,12 +132,12 @@ impl<S: Sample> Input for Planar<'_, S> {
         self.frames
     }
 
-    /// One channel is interleaved as it lies.
-    fn in_memory<T: Sample>(&self) -> Option<&[T]> {
-        match self.channels {
-            [alone] => same(alone),
-            _ => None,
-        }
+    fn in_memory_f32(&self) -> Option<&[f32]> {
+        self.alone().and_then(same)
+    }
+
+    fn in_memory_f64(&self) -> Option<&[f64]> {
+        self.alone().and_then(same)
     }
 
     fn is_finite(&self, frames: Range<usize>) -> bool {
@@ -122,19 +146,17 @@ impl<S: Sample> Input for Planar<'_, S> {
             .all(|channel| channel[frames.clone()].iter().all(|sample| sample.to_f64().is_finite()))
     }
 
-    fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
+    fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {
         let n = self.channels.len();
-        match same_mut::<T, f32>(samples) {
-            Some(samples) if n <= MOST_ROWS => interleave_rows(isa, n, samples, |i, start, row| {
-                convert(&self.channels[i][first + start..][..row.len()], row);
-            }),
-            _ => {
-                for (k, frame) in (first..).zip(samples.chunks_exact_mut(n)) {
-                    for (slot, channel) in frame.iter_mut().zip(self.channels) {
-                        *slot = T::from_f64(channel[k].to_f64());
-                    }
-                }
-            }
+        if n > MOST_ROWS {
+            return self.load_each(first, samples);
         }
+        interleave_rows(isa, n, samples, |i, start, row| {
+            convert(&self.channels[i][first + start..][..row.len()], row);
+        });
+    }
+
+    fn load_f64(&self, _: Isa, first: usize, samples: &mut [f64]) {
+        self.load_each(first, samples);
     }
 }

@@ -14,21 +14,25 @@ pub use in_memory::{Interleaved, Planar};
 pub(crate) use offsets::{Offsets, WithoutOffsets};
 pub use pcm::PcmOutput;
 
-use crate::sample::same;
+use crate::sample::{same, same_mut};
 use crate::{Isa, Sample};
 use std::ops::Range;
 
-/// The input of a call: frames of N samples, one of each channel.
-pub trait Input {
+/// The input of a call: frames of N samples, one of each channel. The kernels ask for it block by block.
+pub trait Input: Sync {
     /// N, samples per frame.
     fn channels(&self) -> usize;
 
     /// Frames of the call.
     fn frames(&self) -> usize;
 
-    /// All samples, frame after frame, if they lie so in memory and are of type `T`. The kernels read them
-    /// there.
-    fn in_memory<T: Sample>(&self) -> Option<&[T]> {
+    /// All samples, frame after frame, if they lie so in memory as f32. The kernels read them there.
+    fn in_memory_f32(&self) -> Option<&[f32]> {
+        None
+    }
+
+    /// As [`Input::in_memory_f32`].
+    fn in_memory_f64(&self) -> Option<&[f64]> {
         None
     }
 
@@ -40,11 +44,14 @@ pub trait Input {
     /// Copies frames from frame `first` on to `samples`, frame after frame: `samples.len() / N` frames, all
     /// of which are there. NaN and infinity are copied as they are. `isa` is the instruction set for
     /// conversions.
-    fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]);
+    fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]);
+
+    /// As [`Input::load_f32`].
+    fn load_f64(&self, isa: Isa, first: usize, samples: &mut [f64]);
 }
 
 /// Where the output of a call goes: samples at the fast rate, M for each frame of the input.
-pub trait Output {
+pub trait Output: Send {
     /// Samples that fit.
     fn capacity(&self) -> usize;
 
@@ -52,29 +59,68 @@ pub trait Output {
     /// samples has part 0 only.
     fn select(&mut self, _part: usize) {}
 
-    /// Room for the samples of a range, if samples lie one after another in memory and are of type `T`. The
-    /// kernels write them there; some may be written more than once.
-    fn slots<T: Sample>(&mut self, _samples: Range<usize>) -> Option<&mut [T]> {
+    /// Room for the samples of a range, if samples lie one after another in memory as f32. The kernels write
+    /// them there; some may be written more than once.
+    fn slots_f32(&mut self, _samples: Range<usize>) -> Option<&mut [f32]> {
+        None
+    }
+
+    /// As [`Output::slots_f32`].
+    fn slots_f64(&mut self, _samples: Range<usize>) -> Option<&mut [f64]> {
         None
     }
 
     /// Stores samples from sample `first` on. `isa` is the instruction set for conversions.
-    fn store<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]);
+    fn store_f32(&mut self, isa: Isa, first: usize, samples: &[f32]);
+
+    /// As [`Output::store_f32`].
+    fn store_f64(&mut self, isa: Isa, first: usize, samples: &[f64]);
 }
 
 /// An output whose beginning and end may be written by two threads.
-pub trait SplitOutput: Output + Send {
-    /// One of the two parts.
-    type Half<'h>: SplitOutput + ?Sized
-    where
-        Self: 'h;
-
+pub trait SplitOutput: Output {
     /// Calls `with` with the room for the first `samples` samples and that for all others.
-    fn halves<'h, R>(
-        &'h mut self,
-        samples: usize,
-        with: impl FnOnce(&mut Self::Half<'h>, &mut Self::Half<'h>) -> R,
-    ) -> R;
+    fn halves(&mut self, samples: usize, with: Halves<'_>);
+}
+
+/// Takes both parts of an output.
+pub type Halves<'w> = &'w mut dyn FnMut(&mut dyn SplitOutput, &mut dyn SplitOutput);
+
+/// By number type.
+impl dyn Input + '_ {
+    pub(crate) fn in_memory<T: Sample>(&self) -> Option<&[T]> {
+        self.in_memory_f32().and_then(same).or_else(|| self.in_memory_f64().and_then(same))
+    }
+
+    /// [`Input::load_f32`] or [`Input::load_f64`].
+    pub fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
+        if let Some(samples) = same_mut(samples) {
+            return self.load_f32(isa, first, samples);
+        }
+        if let Some(samples) = same_mut(samples) {
+            self.load_f64(isa, first, samples);
+        }
+    }
+}
+
+/// By number type.
+impl dyn Output + '_ {
+    pub(crate) fn slots<T: Sample>(&mut self, samples: Range<usize>) -> Option<&mut [T]> {
+        if size_of::<T>() == 4 {
+            self.slots_f32(samples).and_then(same_mut)
+        } else {
+            self.slots_f64(samples).and_then(same_mut)
+        }
+    }
+
+    /// [`Output::store_f32`] or [`Output::store_f64`].
+    pub fn store<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]) {
+        if let Some(samples) = same(samples) {
+            self.store_f32(isa, first, samples);
+        } else if let Some(samples) = same(samples) {
+            self.store_f64(isa, first, samples);
+        }
+    }
 }
 
 /// Frames of zeros.
@@ -85,7 +131,7 @@ pub trait SplitOutput: Output + Send {
 /// let mut stream = Stream::new(&Plan::from_taps(&[vec![0.0, 1.0]], 1, 0, Options::default())?);
 /// let mut output = [1.0f32; 2];
 /// stream.process(&[0.5f32], &mut output[..1])?;
-/// stream.run(&Zeros { channels: 1, frames: 2 }, &mut output[..])?;
+/// stream.run(&Zeros { channels: 1, frames: 2 }, &mut output.as_mut_slice())?;
 /// assert_eq!(output, [0.5, 0.0]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -106,8 +152,12 @@ impl Input for Zeros {
         self.frames
     }
 
-    fn load<T: Sample>(&self, _: Isa, _: usize, samples: &mut [T]) {
-        samples.fill(T::default());
+    fn load_f32(&self, _: Isa, _: usize, samples: &mut [f32]) {
+        samples.fill(0.0);
+    }
+
+    fn load_f64(&self, _: Isa, _: usize, samples: &mut [f64]) {
+        samples.fill(0.0);
     }
 }
 
@@ -147,21 +197,27 @@ fn interleave_rows(isa: Isa, n: usize, samples: &mut [f32], row: impl Fn(usize, 
 const MOST_ROWS: usize = SCRATCH / 8;
 
 /// The frames of a range of another input, where they lie.
-#[derive(Debug, Clone)]
-pub struct Frames<'a, I: ?Sized> {
-    input: &'a I,
+#[derive(Clone)]
+pub struct Frames<'a> {
+    input: &'a dyn Input,
     range: Range<usize>,
 }
 
-impl<'a, I: Input + ?Sized> Frames<'a, I> {
+impl<'a> Frames<'a> {
     /// Frames `range` of `input`, as far as it has them.
-    pub fn new(input: &'a I, range: Range<usize>) -> Self {
+    pub fn new(input: &'a dyn Input, range: Range<usize>) -> Self {
         let end = range.end.min(input.frames());
         Self { input, range: range.start.min(end)..end }
     }
+
+    /// The places of the frames among the samples of the input.
+    fn samples(&self) -> Range<usize> {
+        let n = self.channels();
+        self.range.start * n..self.range.end * n
+    }
 }
 
-impl<I: Input + ?Sized> Input for Frames<'_, I> {
+impl Input for Frames<'_> {
     fn channels(&self) -> usize {
         self.input.channels()
     }
@@ -170,16 +226,23 @@ impl<I: Input + ?Sized> Input for Frames<'_, I> {
         self.range.len()
     }
 
-    fn in_memory<T: Sample>(&self) -> Option<&[T]> {
-        let n = self.channels();
-        self.input.in_memory().map(|samples| &samples[self.range.start * n..self.range.end * n])
+    fn in_memory_f32(&self) -> Option<&[f32]> {
+        self.input.in_memory_f32().map(|samples| &samples[self.samples()])
+    }
+
+    fn in_memory_f64(&self) -> Option<&[f64]> {
+        self.input.in_memory_f64().map(|samples| &samples[self.samples()])
     }
 
     fn is_finite(&self, frames: Range<usize>) -> bool {
         self.input.is_finite(self.range.start + frames.start..self.range.start + frames.end)
     }
 
-    fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
-        self.input.load(isa, self.range.start + first, samples);
+    fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {
+        self.input.load_f32(isa, self.range.start + first, samples);
+    }
+
+    fn load_f64(&self, isa: Isa, first: usize, samples: &mut [f64]) {
+        self.input.load_f64(isa, self.range.start + first, samples);
     }
 }

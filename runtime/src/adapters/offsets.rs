@@ -1,7 +1,6 @@
 //! The offsets of the converters, subtracted from the samples on their way to the kernels.
 
 use super::Input;
-use crate::sample::same;
 use crate::{BuildError, Isa, Sample};
 
 /// Samples after which the pattern of offsets repeats, at least: long enough for whole vectors.
@@ -34,23 +33,15 @@ impl Offsets {
         let double = offsets.repeat(PATTERN.div_ceil(channels));
         Ok(Some(Self { single: double.iter().map(|&offset| f32::from_f64(offset)).collect(), double }))
     }
-
-    /// Subtracts the offsets from whole frames.
-    fn subtract_from<T: Sample>(&self, samples: &mut [T]) {
-        let pattern: &[T] = same(&self.single).or_else(|| same(&self.double)).unwrap_or_default();
-        for part in samples.chunks_mut(pattern.len()) {
-            part.iter_mut().zip(pattern).for_each(|(sample, &offset)| *sample = *sample - offset);
-        }
-    }
 }
 
 /// The frames of an input without the offsets. What is not finite stays so.
-pub(crate) struct WithoutOffsets<'a, I: ?Sized> {
-    pub(crate) input: &'a I,
+pub(crate) struct WithoutOffsets<'a> {
+    pub(crate) input: &'a dyn Input,
     pub(crate) offsets: &'a Offsets,
 }
 
-impl<I: Input + ?Sized> Input for WithoutOffsets<'_, I> {
+impl Input for WithoutOffsets<'_> {
     fn channels(&self) -> usize {
         self.input.channels()
     }
@@ -59,8 +50,20 @@ impl<I: Input + ?Sized> Input for WithoutOffsets<'_, I> {
         self.input.frames()
     }
 
-    fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
-        self.input.load(isa, first, samples);
-        self.offsets.subtract_from(samples);
+    fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {
+        self.input.load_f32(isa, first, samples);
+        subtract(&self.offsets.single, samples);
+    }
+
+    fn load_f64(&self, isa: Isa, first: usize, samples: &mut [f64]) {
+        self.input.load_f64(isa, first, samples);
+        subtract(&self.offsets.double, samples);
+    }
+}
+
+/// Subtracts a pattern of offsets from whole frames.
+fn subtract<T: Sample>(pattern: &[T], samples: &mut [T]) {
+    for part in samples.chunks_mut(pattern.len()) {
+        part.iter_mut().zip(pattern).for_each(|(sample, &offset)| *sample = *sample - offset);
     }
 }

@@ -1,8 +1,7 @@
 //! Recordings as they lie in files and pipes.
 
-use super::{Input, MOST_ROWS, Output, SCRATCH, SplitOutput, convert, interleave_rows};
+use super::{Halves, Input, MOST_ROWS, Output, SCRATCH, SplitOutput, convert, interleave_rows};
 use crate::pcm::for_pcm_format;
-use crate::sample::{same, same_mut};
 use crate::simd::{decode, encode};
 use crate::{Isa, PcmFormat, PcmFrames, Sample, SampleLayout};
 use std::ops::Range;
@@ -35,6 +34,19 @@ impl<'a> PcmOutput<'a> {
         ([half(earlier), half(later)], &mut self.clipped)
     }
 
+    /// Room for samples that lie in memory as numbers do. Parts of complex samples lie apart.
+    fn slots_as<T: Sample>(&mut self, samples: Range<usize>) -> Option<&mut [T]> {
+        let is_native = is_native::<T>(self.selected().0);
+        let numbers = is_native.then(|| bytemuck::try_cast_slice_mut(self.bytes).ok());
+        numbers.flatten().map(|numbers| &mut numbers[samples])
+    }
+
+    /// How the selected samples lie, and the room from sample `first` on.
+    fn from(&mut self, first: usize) -> (SampleLayout, &mut [u8]) {
+        let (layout, before) = self.selected();
+        (layout, &mut self.bytes[before + first * layout.container..])
+    }
+
     /// How the selected samples lie, and the bytes before the first one.
     fn selected(&self) -> (SampleLayout, usize) {
         self.part.map_or((self.layout, 0), |part| (self.layout.part(), part * self.layout.container))
@@ -48,7 +60,7 @@ fn is_native<T: Sample>(layout: SampleLayout) -> bool {
 }
 
 /// Several recordings side by side: their channels follow each other.
-impl Input for [PcmFrames<'_>] {
+impl Input for &[PcmFrames<'_>] {
     fn channels(&self) -> usize {
         self.iter().map(|recording| recording.channels).sum()
     }
@@ -57,47 +69,54 @@ impl Input for [PcmFrames<'_>] {
         self.iter().map(PcmFrames::frames).min().unwrap_or(0)
     }
 
-    fn in_memory<T: Sample>(&self) -> Option<&[T]> {
-        let [alone] = self else { return None };
-        if !is_native::<T>(alone.layout) {
-            return None;
-        }
-        let whole = alone.bytes.len() / alone.frame_bytes() * alone.frame_bytes();
-        bytemuck::try_cast_slice(&alone.bytes[..whole]).ok()
+    fn in_memory_f32(&self) -> Option<&[f32]> {
+        native(self)
+    }
+
+    fn in_memory_f64(&self) -> Option<&[f64]> {
+        native(self)
     }
 
     fn is_finite(&self, frames: Range<usize>) -> bool {
         self.iter().all(|recording| recording.range(frames.clone()).is_finite())
     }
 
-    fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
-        if let [alone] = self {
-            return load_recording(isa, alone, first, samples);
-        }
+    fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {
         let n = self.channels();
-        let mono = self.iter().all(|recording| recording.channels == 1);
-        match same_mut::<T, f32>(samples) {
-            Some(samples) if mono && n <= MOST_ROWS => {
+        match self {
+            [alone] => load_recording(isa, alone, first, samples),
+            many if n <= MOST_ROWS && many.iter().all(|recording| recording.channels == 1) => {
                 interleave_rows(isa, n, samples, |i, start, row| {
-                    load_recording(isa, &self[i], first + start, row);
+                    load_recording(isa, &many[i], first + start, row);
                 });
             }
-            _ => load_each(self, first, samples),
+            many => load_each(many, first, samples),
         }
+    }
+
+    fn load_f64(&self, _: Isa, first: usize, samples: &mut [f64]) {
+        load_each(self, first, samples);
     }
 }
 
+/// The samples of one recording as they lie in memory, if they are numbers of type `T`.
+fn native<'a, T: Sample>(recordings: &[PcmFrames<'a>]) -> Option<&'a [T]> {
+    let [alone] = recordings else { return None };
+    let whole = alone.bytes.len() / alone.frame_bytes() * alone.frame_bytes();
+    is_native::<T>(alone.layout).then(|| bytemuck::try_cast_slice(&alone.bytes[..whole]).ok()).flatten()
+}
+
 /// All channels from one recording.
-fn load_recording<T: Sample>(isa: Isa, recording: &PcmFrames<'_>, first: usize, samples: &mut [T]) {
-    let done = match same_mut::<T, f32>(samples) {
-        Some(samples) if recording.layout.is_packed() => {
-            decode(isa, recording.layout.format, &recording.bytes[first * recording.frame_bytes()..], samples)
-        }
-        _ => 0,
+fn load_recording(isa: Isa, recording: &PcmFrames<'_>, first: usize, samples: &mut [f32]) {
+    let PcmFrames { layout, channels, bytes } = *recording;
+    let done = if layout.is_packed() {
+        decode(isa, layout.format, &bytes[first * recording.frame_bytes()..], samples)
+    } else {
+        0
     };
     // Whole frames only; the rest one by one.
-    let done = done / recording.channels;
-    load_columns(recording, first + done, recording.channels, &mut samples[done * recording.channels..]);
+    let done = done / channels;
+    load_columns(recording, first + done, channels, &mut samples[done * channels..]);
 }
 
 /// Any recordings, sample by sample.
@@ -135,46 +154,42 @@ impl Output for PcmOutput<'_> {
         self.part = Some(part);
     }
 
-    fn slots<T: Sample>(&mut self, samples: Range<usize>) -> Option<&mut [T]> {
-        // Parts of complex samples lie apart.
-        let numbers =
-            is_native::<T>(self.selected().0).then(|| bytemuck::try_cast_slice_mut(self.bytes).ok());
-        numbers.flatten().map(|numbers| &mut numbers[samples])
+    fn slots_f32(&mut self, samples: Range<usize>) -> Option<&mut [f32]> {
+        self.slots_as(samples)
     }
 
-    fn store<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]) {
-        let (layout, before) = self.selected();
-        let SampleLayout { format, container } = layout;
-        let out = &mut self.bytes[before + first * container..];
-        self.clipped += match same(samples) {
-            Some(samples) if layout.is_packed() => encode(isa, format, samples, out),
-            None if layout.is_packed() && format.bytes() < 4 => encode_by_scratch(isa, format, samples, out),
+    fn slots_f64(&mut self, samples: Range<usize>) -> Option<&mut [f64]> {
+        self.slots_as(samples)
+    }
+
+    fn store_f32(&mut self, isa: Isa, first: usize, samples: &[f32]) {
+        let (layout, out) = self.from(first);
+        self.clipped += match layout.is_packed() {
+            true => encode(isa, layout.format, samples, out),
+            false => encode_each(layout, samples, out),
+        };
+    }
+
+    fn store_f64(&mut self, isa: Isa, first: usize, samples: &[f64]) {
+        let (layout, out) = self.from(first);
+        self.clipped += match layout.is_packed() && layout.format.bytes() < 4 {
+            true => encode_by_scratch(isa, layout.format, samples, out),
             // Formats that hold more digits than f32, and samples apart.
-            _ => encode_each(layout, samples, out),
+            false => encode_each(layout, samples, out),
         };
     }
 }
 
 impl SplitOutput for PcmOutput<'_> {
-    type Half<'h>
-        = PcmOutput<'h>
-    where
-        Self: 'h;
-
-    fn halves<'h, R>(
-        &'h mut self,
-        samples: usize,
-        with: impl FnOnce(&mut Self::Half<'h>, &mut Self::Half<'h>) -> R,
-    ) -> R {
+    fn halves(&mut self, samples: usize, with: Halves<'_>) {
         let ([mut earlier, mut later], clipped) = self.split(samples);
-        let result = with(&mut earlier, &mut later);
+        with(&mut earlier, &mut later);
         *clipped += earlier.clipped + later.clipped;
-        result
     }
 }
 
 /// Rounded to f32 first, which formats of few digits do not notice.
-fn encode_by_scratch<T: Sample>(isa: Isa, format: PcmFormat, samples: &[T], out: &mut [u8]) -> u64 {
+fn encode_by_scratch(isa: Isa, format: PcmFormat, samples: &[f64], out: &mut [u8]) -> u64 {
     let mut scratch = [0f32; SCRATCH];
     let parts = samples.chunks(SCRATCH).zip(out.chunks_mut(SCRATCH * format.bytes()));
     parts

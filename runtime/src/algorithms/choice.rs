@@ -1,14 +1,11 @@
-//! Which algorithm FIR filters run by, and what it costs.
+//! Which algorithm FIR filters run by.
 //!
-//! The cost of a frame is counted in multiply-adds of whole vectors. Its constants were fitted by
-//! `tools/algorithm_costs.py` to what `cargo bench --bench algorithm_crossover` measured (see
-//! `benches/README.md`), in f32 and f64 alike. They depend on the bank and the number type only, not on the
-//! processor, its load or the length of calls: a bank gives the same bits everywhere. The algorithms round
-//! differently, so a model for each instruction set would let the processor choose the bits.
+//! The choice depends on the sizes of the bank only, not on the processor, its load or the length of calls: the
+//! algorithms round differently, and a bank gives the same bits everywhere.
 
 use super::filter::phase_taps;
 use super::overlap_save::Shape;
-use crate::simd::{SHORTEST_TRANSFORM, group_lanes};
+use crate::simd::group_lanes;
 use crate::{BuildError, PcmFormat};
 use std::fmt;
 use std::str::FromStr;
@@ -19,7 +16,7 @@ use std::str::FromStr;
 ///
 /// ```
 /// use hybank_runtime::{Algorithm, ParseAlgorithmError};
-/// assert_eq!("overlap-save".parse(), Ok(Algorithm::OverlapSave { transform: None }));
+/// assert_eq!("overlap-save".parse(), Ok(Algorithm::OverlapSave));
 /// assert_eq!("fft".parse::<Algorithm>(), Err(ParseAlgorithmError("fft".into())));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -28,14 +25,10 @@ pub enum Algorithm {
     /// Every product is computed; no sample is later than the bank's latency.
     #[default]
     Direct,
-    /// Fourier transforms of `transform` = F frames, a power of two from 16 on that is at least K, or of the
-    /// best such length. For long filters a fraction of the work, but the output is later by
+    /// Fourier transforms of blocks. For long filters a fraction of the work, but the output is later by
     /// [`extra_latency`](crate::Plan::extra_latency).
-    OverlapSave {
-        /// F; `None` for the best length.
-        transform: Option<usize>,
-    },
-    /// The faster one by the measured costs of both; the output may be later than the bank's latency.
+    OverlapSave,
+    /// Overlap-save for long filters, else direct; the output may be later than the bank's latency.
     Auto,
 }
 
@@ -76,11 +69,11 @@ impl Precision {
         if matches!(format, F64Be | F64Le | S32Be | S32Le) { Self::Double } else { Self::Single }
     }
 
-    /// Bytes of a number.
-    pub(crate) fn bytes(self) -> f64 {
+    /// Numbers of a lane group.
+    fn lanes(self) -> usize {
         match self {
-            Self::Single => 4.0,
-            Self::Double => 8.0,
+            Self::Single => group_lanes::<f32>(),
+            Self::Double => group_lanes::<f64>(),
         }
     }
 }
@@ -89,47 +82,22 @@ impl Precision {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ChosenAlgorithm {
     Direct,
-    /// By transforms of F frames.
-    OverlapSave(usize),
+    OverlapSave(Shape),
 }
 
-/// Transforms longer than this are not tried.
-const LONGEST_TRANSFORM: usize = 1 << 24;
-
-/// Each pair of a phase and a vector of products: adding its lanes.
-const DIRECT_SUM: f64 = 1.2;
-/// Each output of the direct algorithm.
-const DIRECT_OUTPUT: f64 = 0.3;
-/// A row in one pass of a transform, of radix 4 (the last one may be of radix 2): 17 operations, loads,
-/// stores.
-const ROW_PASS: f64 = 8.0;
-/// Each doubling of F beyond this many rows, which fill half of a first-level cache of 32 KB, makes a pass
-/// longer by this part of it.
-const CACHED_ROWS: f64 = 256.0;
-const CACHE_MISSES: f64 = 0.15;
-/// Each batch: the calls of its kernels, and the search for what is not finite.
-const BATCH: f64 = 400.0;
-/// Each output of overlap-save: from rows to frames.
-const BLOCK_OUTPUT: f64 = 0.8;
-/// Each input of overlap-save, and each frame.
-const BLOCK_INPUT: f64 = 0.5;
-const BLOCK_FRAME: f64 = 1.0;
-
-/// A longer transform must be cheaper by this factor: it makes outputs later, and the model errs by as much.
-const WORTH_LENGTH: f64 = 0.95;
-/// Overlap-save must be cheaper by this factor than the direct algorithm, which rounds less and adds no
-/// latency.
-const WORTH_CHANGE: f64 = 0.9;
+/// Transforms pay from so many lags K on, times N M / (N + M): sums take K N M multiply-adds per frame, transforms a
+/// time by N + M.
+const LONG: usize = 32;
 
 impl Algorithm {
-    /// All algorithms; overlap-save with the best length.
-    pub const ALL: [Self; 3] = [Self::Auto, Self::Direct, Self::OverlapSave { transform: None }];
+    /// All algorithms.
+    pub const ALL: [Self; 3] = [Self::Auto, Self::Direct, Self::OverlapSave];
 
-    /// The name, without the length of a transform.
+    /// The name.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Direct => "direct",
-            Self::OverlapSave { .. } => "overlap-save",
+            Self::OverlapSave => "overlap-save",
             Self::Auto => "auto",
         }
     }
@@ -142,42 +110,23 @@ impl Algorithm {
     /// The algorithm that filters are to run by.
     ///
     /// # Errors
-    /// [`BuildError::Transform`] if no transform, or not the given one, can hold the filters.
+    /// [`BuildError::Spectra`] if no transform can hold the filters.
     pub(crate) fn choose(
         self,
         taps: &[Vec<f64>],
         ratio: usize,
         precision: Precision,
     ) -> Result<ChosenAlgorithm, BuildError> {
-        let size = Size::new(taps, ratio, precision);
-        let refused =
-            |len| BuildError::Transform { len, phase_taps: size.phase_taps, shortest: SHORTEST_TRANSFORM };
-        match self {
-            Self::Direct => Ok(ChosenAlgorithm::Direct),
-            Self::OverlapSave { transform: Some(len) } if !size.holds(len) => Err(refused(len)),
-            Self::OverlapSave { transform: Some(len) } => Ok(ChosenAlgorithm::OverlapSave(len)),
-            Self::OverlapSave { transform: None } => match size.best_transform() {
-                Some((len, _)) => Ok(ChosenAlgorithm::OverlapSave(len)),
-                None => Err(refused(LONGEST_TRANSFORM)),
-            },
-            Self::Auto => Ok(size.fastest()),
+        let (channels, lags) = (taps.len(), phase_taps(taps, ratio));
+        let [sums, transforms] = [lags * channels * ratio, LONG * (channels + ratio)];
+        if self == Self::Direct || (self == Self::Auto && sums < transforms) {
+            return Ok(ChosenAlgorithm::Direct);
         }
-    }
-}
-
-impl ChosenAlgorithm {
-    /// Bytes of the coefficients, and of the states of a plan and of so many streams, about.
-    pub(crate) fn bytes(self, taps: &[Vec<f64>], ratio: usize, precision: Precision, streams: usize) -> f64 {
-        let size = Size::new(taps, ratio, precision);
-        let (coefficients, state) = match self {
-            Self::OverlapSave(len) => size.shape(len).numbers(),
-            // The filters of all phases and the history, both rounded up to whole vectors.
-            Self::Direct => {
-                let history = 2.0 * (size.phase_taps * size.channels) as f64;
-                (history * size.ratio as f64, history)
-            }
-        };
-        (coefficients + (1 + streams) as f64 * state) * precision.bytes()
+        match Shape::new(channels, ratio, lags, precision.lanes()) {
+            Some(shape) => Ok(ChosenAlgorithm::OverlapSave(shape)),
+            None if self == Self::Auto => Ok(ChosenAlgorithm::Direct),
+            None => Err(BuildError::Spectra { channels, ratio, lags }),
+        }
     }
 }
 
@@ -186,77 +135,7 @@ impl ChosenAlgorithm {
 pub(crate) fn check_recursive(algorithm: Algorithm) -> Result<(), BuildError> {
     match algorithm {
         Algorithm::Direct | Algorithm::Auto => Ok(()),
-        Algorithm::OverlapSave { .. } => Err(BuildError::Recursive { algorithm: algorithm.name() }),
-    }
-}
-
-/// Lanes of a group.
-fn group(precision: Precision) -> usize {
-    match precision {
-        Precision::Single => group_lanes::<f32>(),
-        Precision::Double => group_lanes::<f64>(),
-    }
-}
-
-/// What the cost depends on.
-#[derive(Debug, Clone, Copy)]
-struct Size {
-    channels: usize,
-    ratio: usize,
-    /// K.
-    phase_taps: usize,
-    group: usize,
-}
-
-impl Size {
-    fn new(taps: &[Vec<f64>], ratio: usize, precision: Precision) -> Self {
-        Self { channels: taps.len(), ratio, phase_taps: phase_taps(taps, ratio), group: group(precision) }
-    }
-
-    fn holds(&self, len: usize) -> bool {
-        len.is_power_of_two() && (self.phase_taps.max(SHORTEST_TRANSFORM)..=LONGEST_TRANSFORM).contains(&len)
-    }
-
-    /// A frame by the direct algorithm.
-    fn direct(&self) -> f64 {
-        // Windows are cut into whole groups, or whole frames.
-        let frame = self.channels;
-        let depth = if frame < self.group && frame.is_power_of_two() { frame } else { self.group };
-        let steps = (self.phase_taps as f64 * frame as f64 / depth as f64).ceil();
-        let vectors = (self.ratio * depth) as f64 / self.group as f64;
-        vectors * (steps + DIRECT_SUM) + DIRECT_OUTPUT * self.ratio as f64
-    }
-
-    fn shape(&self, len: usize) -> Shape {
-        Shape::new(self.channels, self.ratio, self.phase_taps - 1, len, self.group)
-    }
-
-    /// A frame with transforms of length `len`.
-    fn overlap_save(&self, len: usize) -> f64 {
-        let shape = self.shape(len);
-        let (inputs, outputs) = (shape.inputs() as f64, shape.outputs() as f64);
-        let misses = CACHE_MISSES * (len as f64 / CACHED_ROWS).log2().max(0.0);
-        let passes = f64::from(len.ilog2().div_ceil(2));
-        let transforms = ROW_PASS * (1.0 + misses) * (inputs + outputs) * passes;
-        let products = 4.0 * outputs * self.channels as f64;
-        let samples = BLOCK_OUTPUT * self.ratio as f64 + BLOCK_INPUT * self.channels as f64 + BLOCK_FRAME;
-        (len as f64 * (transforms + products) + BATCH) / shape.batch() as f64 + samples
-    }
-
-    /// The shortest transform that costs hardly more than the best one, and its cost.
-    fn best_transform(&self) -> Option<(usize, f64)> {
-        let shortest = self.phase_taps.checked_next_power_of_two()?.max(SHORTEST_TRANSFORM);
-        let lengths =
-            (0..6).map(|i| shortest << i).filter(|&len| self.holds(len) && self.shape(len).spectra_fit());
-        lengths
-            .map(|len| (len, self.overlap_save(len)))
-            .reduce(|best, next| if next.1 < WORTH_LENGTH * best.1 { next } else { best })
-    }
-
-    fn fastest(&self) -> ChosenAlgorithm {
-        let pays = |&(_, transformed): &(usize, f64)| transformed < WORTH_CHANGE * self.direct();
-        let transform = self.best_transform().filter(pays);
-        transform.map_or(ChosenAlgorithm::Direct, |(len, _)| ChosenAlgorithm::OverlapSave(len))
+        Algorithm::OverlapSave => Err(BuildError::Recursive { algorithm: algorithm.name() }),
     }
 }
 
@@ -264,46 +143,19 @@ impl Size {
 mod tests {
     use super::*;
 
-    fn chosen(
-        n: usize,
-        m: usize,
-        phase_taps: usize,
-        algorithm: Algorithm,
-    ) -> Result<ChosenAlgorithm, BuildError> {
-        algorithm.choose(&vec![vec![1.0; phase_taps * m]; n], m, Precision::Single)
+    fn is_transformed(n: usize, m: usize, lags: usize, algorithm: Algorithm) -> bool {
+        let choice = algorithm.choose(&vec![vec![1.0; lags * m]; n], m, Precision::Single).unwrap();
+        matches!(choice, ChosenAlgorithm::OverlapSave(_))
     }
 
     #[test]
     fn long_filters_are_transformed_and_short_ones_are_not() {
-        // Measured: the direct algorithm wins at the first K, overlap-save at the second by a third at
-        // least.
+        // Measured: the direct algorithm wins at the first K, overlap-save at the second by a third at least.
         for (n, m, short, long) in
-            [(1, 1, 16, 512), (2, 2, 8, 128), (4, 4, 4, 64), (8, 8, 4, 16), (16, 16, 2, 8)]
+            [(1, 1, 16, 512), (2, 2, 8, 128), (4, 4, 4, 64), (8, 8, 4, 32), (16, 16, 2, 16)]
         {
-            assert_eq!(
-                chosen(n, m, short, Algorithm::Auto),
-                Ok(ChosenAlgorithm::Direct),
-                "N {n} M {m} K {short}"
-            );
-            let choice = chosen(n, m, long, Algorithm::Auto).unwrap();
-            assert!(matches!(choice, ChosenAlgorithm::OverlapSave(_)), "N {n} M {m} K {long}: {choice:?}");
-        }
-        // Measured for K = 16: 64 frames take 5 % longer on a Xeon, 10 % on a Zen 5.
-        for (k, best) in [(4, 64), (16, 256), (64, 256)] {
-            let choice = chosen(8, 8, k, Algorithm::OverlapSave { transform: None });
-            assert_eq!(choice, Ok(ChosenAlgorithm::OverlapSave(best)), "K {k}");
-        }
-    }
-
-    #[test]
-    fn a_choice_once_made_stays_for_longer_filters() {
-        for (n, m) in (1..=17).flat_map(|n| (1..=17).map(move |m| (n, m))) {
-            let wins = |phase_taps: usize| {
-                let size = Size { channels: n, ratio: m, phase_taps, group: 8 };
-                matches!(size.fastest(), ChosenAlgorithm::OverlapSave(_))
-            };
-            let first = (0..14).map(|i| 1usize << i).find(|&phase_taps| wins(phase_taps)).unwrap();
-            assert!((0..6).map(|i| first << i).all(wins), "N {n} M {m}: first at K = {first}");
+            assert!(!is_transformed(n, m, short, Algorithm::Auto), "N {n} M {m} K {short}");
+            assert!(is_transformed(n, m, long, Algorithm::Auto), "N {n} M {m} K {long}");
         }
     }
 
@@ -319,14 +171,11 @@ mod tests {
     }
 
     #[test]
-    fn transforms_that_cannot_hold_the_filters_are_refused() {
-        let refused = |len| BuildError::Transform { len, phase_taps: 40, shortest: 16 };
-        for len in [0, 8, 32, 63, 100, 1 << 25] {
-            assert_eq!(chosen(2, 2, 40, Algorithm::OverlapSave { transform: Some(len) }), Err(refused(len)));
-        }
-        assert_eq!(
-            chosen(2, 2, 40, Algorithm::OverlapSave { transform: Some(64) }),
-            Ok(ChosenAlgorithm::OverlapSave(64))
-        );
+    fn spectra_that_would_fill_the_memory_are_refused_or_not_chosen() {
+        let taps = vec![vec![1.0]; 8192];
+        let refused = BuildError::Spectra { channels: 8192, ratio: 1024, lags: 1 };
+        let choose = |algorithm: Algorithm| algorithm.choose(&taps, 1024, Precision::Single);
+        assert_eq!(choose(Algorithm::OverlapSave), Err(refused));
+        assert_eq!(choose(Algorithm::Auto), Ok(ChosenAlgorithm::Direct));
     }
 }

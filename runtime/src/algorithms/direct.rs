@@ -160,9 +160,9 @@ impl<T: Sample> Direct<T> {
     fn process_block(
         &self,
         state: &mut DirectState<T>,
-        input: &(impl Input + ?Sized),
+        input: &dyn Input,
         frames: Range<usize>,
-        output: &mut (impl Output + ?Sized),
+        output: &mut dyn Output,
     ) -> u64 {
         let DirectState { history, output: block } = state;
         let (len, samples) = (frames.len(), frames.start * self.ratio..frames.end * self.ratio);
@@ -220,7 +220,7 @@ impl<T: Sample> Direct<T> {
     /// A state before frame `first` of `input`, as if all frames before it had been processed: at least
     /// [`Direct::history_frames`] of them.
     #[cfg(feature = "rayon")]
-    pub(crate) fn state_at(&self, input: &(impl Input + ?Sized), first: usize) -> DirectState<T> {
+    pub(crate) fn state_at(&self, input: &dyn Input, first: usize) -> DirectState<T> {
         let mut samples = vec![T::default(); self.history_frames * self.channels];
         input.load(self.isa, first - self.history_frames, &mut samples);
         // They are counted where they are processed.
@@ -257,12 +257,7 @@ impl<T: Sample> Filter for Direct<T> {
         state.history.reset();
     }
 
-    fn process(
-        &self,
-        state: &mut DirectState<T>,
-        input: &(impl Input + ?Sized),
-        output: &mut (impl Output + ?Sized),
-    ) -> u64 {
+    fn process(&self, state: &mut DirectState<T>, input: &dyn Input, output: &mut dyn Output) -> u64 {
         let frames = input.frames();
         if let (Some(head), Some(samples)) = (self.head(frames), input.in_memory())
             && let Some(out) = output.slots(0..frames * self.ratio)

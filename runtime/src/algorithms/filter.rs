@@ -21,12 +21,7 @@ pub(crate) trait Filter: Debug + Send + Sync {
 
     /// Filters all frames of the input; returns how many samples were not finite and were taken as 0. Does
     /// not allocate.
-    fn process(
-        &self,
-        state: &mut Self::State,
-        input: &(impl Input + ?Sized),
-        output: &mut (impl Output + ?Sized),
-    ) -> u64;
+    fn process(&self, state: &mut Self::State, input: &dyn Input, output: &mut dyn Output) -> u64;
 
     /// How many numbers make up a state `place` frames after a multiple of the alignment.
     fn count(&self, place: usize) -> Count;

@@ -18,7 +18,7 @@ pub(crate) struct Avx2F64(pub(super) __m256d);
 
 /// The memory access and arithmetic of a register of x86.
 macro_rules! register {
-    ($splat:ident $load:ident $store:ident $add:ident $sub:ident $mul:ident $fmadd:ident $fnmadd:ident) => {
+    ($splat:ident $load:ident $store:ident $add:ident $fmadd:ident) => {
         #[inline(always)]
         unsafe fn splat(value: Self::Sample) -> Self {
             Self($splat(value))
@@ -41,27 +41,9 @@ macro_rules! register {
         }
 
         #[inline(always)]
-        fn sub(self, other: Self) -> Self {
-            // SAFETY: as above.
-            Self(unsafe { $sub(self.0, other.0) })
-        }
-
-        #[inline(always)]
-        fn mul(self, factor: Self) -> Self {
-            // SAFETY: as above.
-            Self(unsafe { $mul(self.0, factor.0) })
-        }
-
-        #[inline(always)]
         fn mul_add(self, factor: Self, sum: Self) -> Self {
             // SAFETY: as above.
             Self(unsafe { $fmadd(self.0, factor.0, sum.0) })
-        }
-
-        #[inline(always)]
-        fn neg_mul_add(self, factor: Self, sum: Self) -> Self {
-            // SAFETY: as above.
-            Self(unsafe { $fnmadd(self.0, factor.0, sum.0) })
         }
     };
 }
@@ -79,8 +61,7 @@ impl Vector for Avx2F32 {
     // Of 16 registers: 12 sums, 3 inputs and a coefficient.
     const SUMS: usize = 12;
 
-    register!(_mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_add_ps _mm256_sub_ps _mm256_mul_ps
-        _mm256_fmadd_ps _mm256_fnmadd_ps);
+    register!(_mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_add_ps _mm256_fmadd_ps);
 
     #[inline(always)]
     fn finite(self) -> bool {
@@ -144,32 +125,6 @@ impl Vector for Avx2F32 {
     }
 
     #[inline(always)]
-    unsafe fn segments<const D: usize>(at: *const f32, hop: usize) -> Self {
-        let s = |segment: usize| at.add(segment * hop);
-        Self(match D {
-            1 => _mm256_setr_ps(*s(0), *s(1), *s(2), *s(3), *s(4), *s(5), *s(6), *s(7)),
-            2 => {
-                let low = _mm_loadh_pd(_mm_load_sd(s(0).cast()), s(1).cast());
-                let high = _mm_loadh_pd(_mm_load_sd(s(2).cast()), s(3).cast());
-                _mm256_castpd_ps(_mm256_set_m128d(high, low))
-            }
-            4 => _mm256_set_m128(_mm_loadu_ps(s(1)), _mm_loadu_ps(at)),
-            _ => _mm256_loadu_ps(at),
-        })
-    }
-
-    #[inline(always)]
-    unsafe fn broadcast_lane<const D: usize>(row: *const f32, n: usize) -> Self {
-        Self(match D {
-            1 => _mm256_loadu_ps(row),
-            2 if n == 0 => _mm256_moveldup_ps(_mm256_loadu_ps(row)),
-            2 => _mm256_movehdup_ps(_mm256_loadu_ps(row)),
-            4 => _mm256_permutevar_ps(_mm256_loadu_ps(row), _mm256_set1_epi32(n as i32)),
-            _ => _mm256_set1_ps(*row.add(n)),
-        })
-    }
-
-    #[inline(always)]
     unsafe fn load_i16(at: *const u8) -> Self {
         let wide = _mm256_cvtepi16_epi32(_mm_loadu_si128(at.cast()));
         Self(_mm256_mul_ps(_mm256_cvtepi32_ps(wide), _mm256_set1_ps(1.0 / 32768.0)))
@@ -214,8 +169,7 @@ impl Vector for Avx2F64 {
     const LANES: usize = 4;
     const SUMS: usize = 12;
 
-    register!(_mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd _mm256_add_pd _mm256_sub_pd _mm256_mul_pd
-        _mm256_fmadd_pd _mm256_fnmadd_pd);
+    register!(_mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd _mm256_add_pd _mm256_fmadd_pd);
 
     #[inline(always)]
     fn finite(self) -> bool {
@@ -261,25 +215,5 @@ impl Vector for Avx2F64 {
         steps: usize,
     ) -> Option<[[Self; R]; P]> {
         tile_f64::<_, D, P, R>(Self, x, stride, coefficients, steps)
-    }
-
-    #[inline(always)]
-    unsafe fn segments<const D: usize>(at: *const f64, hop: usize) -> Self {
-        let s = |segment: usize| at.add(segment * hop);
-        Self(match D {
-            1 => _mm256_setr_pd(*s(0), *s(1), *s(2), *s(3)),
-            2 => _mm256_set_m128d(_mm_loadu_pd(s(1)), _mm_loadu_pd(at)),
-            _ => _mm256_loadu_pd(at),
-        })
-    }
-
-    #[inline(always)]
-    unsafe fn broadcast_lane<const D: usize>(row: *const f64, n: usize) -> Self {
-        Self(match D {
-            1 => _mm256_loadu_pd(row),
-            2 if n == 0 => _mm256_movedup_pd(_mm256_loadu_pd(row)),
-            2 => _mm256_permute_pd::<0b1111>(_mm256_loadu_pd(row)),
-            _ => _mm256_set1_pd(*row.add(n)),
-        })
     }
 }

@@ -195,8 +195,7 @@ impl Vector for Avx512F32 {
     // Of 32 registers: 24 sums, and the fewer of inputs and coefficients.
     const SUMS: usize = 24;
 
-    register!(_mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_add_ps _mm512_sub_ps _mm512_mul_ps
-        _mm512_fmadd_ps _mm512_fnmadd_ps);
+    register!(_mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_add_ps _mm512_fmadd_ps);
 
     #[inline(always)]
     fn finite(self) -> bool {
@@ -318,8 +317,7 @@ impl Vector for Avx512F64 {
     const LANES: usize = 8;
     const SUMS: usize = 24;
 
-    register!(_mm512_set1_pd _mm512_loadu_pd _mm512_storeu_pd _mm512_add_pd _mm512_sub_pd _mm512_mul_pd
-        _mm512_fmadd_pd _mm512_fnmadd_pd);
+    register!(_mm512_set1_pd _mm512_loadu_pd _mm512_storeu_pd _mm512_add_pd _mm512_fmadd_pd);
 
     #[inline(always)]
     fn finite(self) -> bool {

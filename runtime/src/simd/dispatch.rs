@@ -8,6 +8,7 @@ use super::avx2::{Avx2F32, Avx2F64};
 #[cfg(target_arch = "x86_64")]
 use super::avx512::{Avx512F32, Avx512F64};
 use super::isa::{Isa, Kind};
+use super::lanes::Lanes;
 #[cfg(target_arch = "aarch64")]
 use super::neon::{NeonF32, NeonF64};
 use super::portable::Portable;
@@ -16,7 +17,7 @@ use super::vector::{Number, Vector};
 /// A sample type with its vector in each instruction set.
 pub(crate) trait Element: Number {
     /// One group as an array.
-    type Portable: Vector<Sample = Self>;
+    type Portable: Vector<Sample = Self> + Lanes<Self>;
     /// One group.
     #[cfg(target_arch = "x86_64")]
     type Avx2: Vector<Sample = Self>;

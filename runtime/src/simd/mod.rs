@@ -5,7 +5,8 @@
 //! dispatch   from an Isa to a function compiled for it
 //! vector     the vector trait, all that kernels know of an instruction set
 //! portable  avx2  avx512  neon      the trait for each set
-//! fir  recursion  transform (passes, product)  pcm  finite  peak      the kernels
+//! fir  recursion  spectra  pcm  finite  peak      the kernels
+//! lanes      lane groups as the numbers of rustfft
 //! ```
 //!
 //! Each kernel is one body that is generic over the vector type, compiled once for each instruction set.
@@ -17,7 +18,7 @@
 //! again in its body. There are two preconditions. *The set is there*: a function that is generic over a
 //! vector runs only inside [`dispatch`], in a function compiled for the vector's set, which only an [`Isa`]
 //! selects. *The memory is there*: the safe call of each kernel (`Polyphase::run`, `RecursionKernel::run`,
-//! those of `TransformKernel`, `interleave`) asserts the lengths of its slices once, from the numbers by
+//! `interleave`) asserts the lengths of its slices once, from the numbers by
 //! which the kernel addresses them. Unsafe blocks in safe functions say which of the two holds there, and
 //! why.
 //!
@@ -41,27 +42,25 @@ mod dispatch;
 mod finite;
 mod fir;
 mod isa;
+mod lanes;
 #[cfg(target_arch = "aarch64")]
 mod neon;
-mod passes;
 mod pcm;
 mod peak;
 mod portable;
-mod product;
 mod recursion;
-mod transform;
-mod transform_kernel;
+mod spectra;
 mod vector;
 #[cfg(test)]
 pub(crate) mod work;
 
 pub(crate) use dispatch::Element;
-pub(crate) use finite::{Replaced, all_finite, not_finite, replace_not_finite};
+pub(crate) use finite::{Replaced, not_finite, replace_not_finite};
 pub(crate) use fir::{FirKernel, Polyphase, Segment, Tiling};
 pub use isa::Isa;
+pub(crate) use lanes::{Lanes, Row};
 pub(crate) use pcm::{decode, encode, interleave};
 pub use peak::multiply_add_chains;
 pub(crate) use recursion::{ColumnTile, Form, Recursion, RecursionKernel, SectionVector};
-pub(crate) use transform::{OutputFrames, SHORTEST_TRANSFORM, Segments, Spectra, Transform, row_samples};
-pub(crate) use transform_kernel::TransformKernel;
+pub(crate) use spectra::{Product, multiply};
 pub(crate) use vector::group_lanes;

@@ -22,7 +22,7 @@ macro_rules! both {
 }
 
 macro_rules! neon {
-    ($vector:ident, $sample:ty, $lanes:literal, $dup:ident $load:ident $store:ident $add:ident $sub:ident $mul:ident $fma:ident $fms:ident) => {
+    ($vector:ident, $sample:ty, $lanes:literal, $dup:ident $load:ident $store:ident $add:ident $fma:ident) => {
         impl Vector for $vector {
             type Sample = $sample;
             const LANES: usize = $lanes;
@@ -51,27 +51,12 @@ macro_rules! neon {
             }
 
             #[inline(always)]
-            fn sub(self, other: Self) -> Self {
-                both!($sub, self, other)
-            }
-
-            #[inline(always)]
-            fn mul(self, factor: Self) -> Self {
-                both!($mul, self, factor)
-            }
-
-            #[inline(always)]
             fn mul_add(self, factor: Self, sum: Self) -> Self {
                 both!($fma, sum, self, factor)
-            }
-
-            #[inline(always)]
-            fn neg_mul_add(self, factor: Self, sum: Self) -> Self {
-                both!($fms, sum, self, factor)
             }
         }
     };
 }
 
-neon!(NeonF32, f32, 8, vdupq_n_f32 vld1q_f32 vst1q_f32 vaddq_f32 vsubq_f32 vmulq_f32 vfmaq_f32 vfmsq_f32);
-neon!(NeonF64, f64, 4, vdupq_n_f64 vld1q_f64 vst1q_f64 vaddq_f64 vsubq_f64 vmulq_f64 vfmaq_f64 vfmsq_f64);
+neon!(NeonF32, f32, 8, vdupq_n_f32 vld1q_f32 vst1q_f32 vaddq_f32 vfmaq_f32);
+neon!(NeonF64, f64, 4, vdupq_n_f64 vld1q_f64 vst1q_f64 vaddq_f64 vfmaq_f64);

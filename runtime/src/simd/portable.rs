@@ -3,8 +3,9 @@
 use super::vector::{Number, Vector};
 
 /// L lanes of T, 32 bytes.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Portable<T, const L: usize>([T; L]);
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(align(32))]
+pub(crate) struct Portable<T, const L: usize>(pub(super) [T; L]);
 
 impl<T, const L: usize> Vector for Portable<T, L>
 where
@@ -36,22 +37,7 @@ where
     }
 
     #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Self(std::array::from_fn(|l| self.0[l] - other.0[l]))
-    }
-
-    #[inline(always)]
-    fn mul(self, factor: Self) -> Self {
-        Self(std::array::from_fn(|l| self.0[l] * factor.0[l]))
-    }
-
-    #[inline(always)]
     fn mul_add(self, factor: Self, sum: Self) -> Self {
         Self(std::array::from_fn(|l| self.0[l].mul_add(factor.0[l], sum.0[l])))
-    }
-
-    #[inline(always)]
-    fn neg_mul_add(self, factor: Self, sum: Self) -> Self {
-        Self(std::array::from_fn(|l| (-self.0[l]).mul_add(factor.0[l], sum.0[l])))
     }
 }

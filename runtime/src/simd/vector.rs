@@ -11,7 +11,7 @@
 //! first two do.
 
 use std::fmt::Debug;
-use std::ops::{Add, Mul, Neg, Sub};
+use std::ops::{Add, Div, Mul, Neg, Rem, Sub};
 
 /// A sample type: f32 or f64.
 pub(crate) trait Number:
@@ -24,6 +24,8 @@ pub(crate) trait Number:
     + Add<Output = Self>
     + Sub<Output = Self>
     + Mul<Output = Self>
+    + Div<Output = Self>
+    + Rem<Output = Self>
     + Neg<Output = Self>
     + From<f32>
     + Into<f64>
@@ -98,14 +100,8 @@ pub(crate) trait Vector: Copy {
     unsafe fn store(self, at: *mut Self::Sample);
     /// self + other.
     fn add(self, other: Self) -> Self;
-    /// self - other.
-    fn sub(self, other: Self) -> Self;
-    /// self * factor.
-    fn mul(self, factor: Self) -> Self;
     /// self * factor + sum, rounded once.
     fn mul_add(self, factor: Self, sum: Self) -> Self;
-    /// sum - self * factor, rounded once.
-    fn neg_mul_add(self, factor: Self, sum: Self) -> Self;
 
     /// All lanes zero.
     #[inline(always)]
@@ -264,18 +260,6 @@ pub(crate) trait Vector: Copy {
         _steps: usize,
     ) -> Option<[[Self; R]; P]> {
         None
-    }
-
-    /// Lanes of segments, D each: those of segment s from `at + s * hop` on.
-    #[inline(always)]
-    unsafe fn segments<const D: usize>(at: *const Self::Sample, hop: usize) -> Self {
-        Self::from_fn(|l| *at.add(l / D * hop + l % D))
-    }
-
-    /// Lane n of each segment of the vector at `row`, in all D lanes of the segment.
-    #[inline(always)]
-    unsafe fn broadcast_lane<const D: usize>(row: *const Self::Sample, n: usize) -> Self {
-        Self::from_fn(|l| *row.add(l / D * D + n))
     }
 
     /// Samples from little-endian 16-bit integers, which are divided by 2^15.

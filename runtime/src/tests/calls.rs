@@ -18,12 +18,12 @@ fn calls_and_banks_that_do_not_fit_are_refused() {
     );
     assert_eq!(stream.process(&[], &mut out), Ok(0));
     let mut output = PcmOutput::packed(PcmFormat::S8, &mut []);
-    assert_eq!(stream.run(&[][..], &mut output), Err(ProcessError::Channels { given: 0, wanted: 2 }));
+    assert_eq!(stream.run(&[].as_slice(), &mut output), Err(ProcessError::Channels { given: 0, wanted: 2 }));
 
     // More samples than can be counted; the product once wrapped to 0.
     let endless = Zeros { channels: 2, frames: usize::MAX / 2 + 1 };
     assert_eq!(
-        stream.run(&endless, &mut out[..]),
+        stream.run(&endless, &mut out.as_mut_slice()),
         Err(ProcessError::TooManyFrames { frames: endless.frames, ratio: 2 })
     );
 

@@ -1,8 +1,7 @@
 //! How a stream is cut into calls changes no bit, and neither does NaN in place of zero.
 
-use super::support::{Noise, fir_bank, in_pieces, precise, random_taps, start};
-use crate::algorithms::filter::phase_taps;
-use crate::{Algorithm, Precision, Stream};
+use super::support::{FIR_ALGORITHMS, Noise, fir_bank, in_pieces, precise, random_taps, start};
+use crate::{Precision, Stream};
 use proptest::prelude::*;
 
 /// Asserts that marked samples give what zeros in their place give, in one call and in calls of `cuts`
@@ -31,17 +30,16 @@ proptest! {
 
     #[test]
     fn cuts_do_not_change_a_bit(
-        n in 1usize..10, m in 1usize..10, count in 1usize..60, more in 0usize..3, seed: u64,
+        n in 1usize..10, m in 1usize..10, count in 1usize..60, seed: u64,
         cuts in prop::collection::vec(prop_oneof![0usize..20, 0usize..1200], 1..16), double: bool,
         lost in prop::collection::vec(0usize..100_000, 0..4),
     ) {
         let mut noise = Noise(seed);
         let taps = random_taps(n, m + count, &mut noise);
         let input = noise.samples(n * cuts.iter().sum::<usize>());
-        let len = phase_taps(&taps, m).next_power_of_two().max(16) << more;
         let bank = fir_bank(taps, m);
         let precision = if double { Precision::Double } else { Precision::Single };
-        for algorithm in [Algorithm::Direct, Algorithm::OverlapSave { transform: Some(len) }] {
+        for algorithm in FIR_ALGORITHMS {
             check_cuts(&mut start(&bank, precise(algorithm, precision)).unwrap(), &input, &lost, &cuts);
         }
     }
@@ -56,7 +54,7 @@ proptest! {
         let mut noise = Noise(seed);
         let bank = fir_bank(random_taps(n, m, &mut noise), m);
         let input = noise.samples(n * cuts.iter().sum::<usize>());
-        for algorithm in [Algorithm::Direct, Algorithm::OverlapSave { transform: Some(16) }] {
+        for algorithm in FIR_ALGORITHMS {
             let mut stream = start(&bank, precise(algorithm, Precision::Single)).unwrap();
             check_cuts(&mut stream, &input, &lost, &cuts);
         }

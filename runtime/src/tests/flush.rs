@@ -33,7 +33,7 @@ fn flushed(stream: &mut Stream, input: &[f64], call: usize) -> Vec<f64> {
         assert_eq!(stream.process(x, y), Ok(y.len()));
     }
     let mut tail = vec![f64::NAN; stream.plan().flush_frames() * m];
-    assert_eq!(stream.flush(&mut tail[..]), Ok(tail.len()));
+    assert_eq!(stream.flush(&mut tail.as_mut_slice()), Ok(tail.len()));
     out.extend(tail);
     out
 }
@@ -73,7 +73,7 @@ fn a_flush_without_room_leaves_the_stream_as_it_was() {
     for (bank, options) in banks(&mut noise).into_iter().filter(|(bank, _)| bank.latency > 0) {
         let mut stream = start(&bank, options).unwrap();
         let wanted = stream.plan().flush_frames() * bank.ratio;
-        let refused = stream.flush(&mut vec![0.0; wanted - 1][..]);
+        let refused = stream.flush(&mut vec![0.0; wanted - 1].as_mut_slice());
         assert_eq!(refused, Err(ProcessError::OutputTooShort { given: wanted - 1, wanted }));
         assert_eq!(stream.position(), 0);
     }

@@ -59,7 +59,7 @@ fn outputs(plan: &Plan, input: &[f32], cuts: &[usize]) -> Vec<f32> {
             break;
         }
     }
-    done += stream.flush(&mut out[done..]).unwrap();
+    done += stream.flush(&mut &mut out[done..]).unwrap();
     assert_eq!((done, stream.replaced()), (out.len(), 0));
     out
 }
@@ -93,7 +93,7 @@ fn offsets_are_subtracted_in_every_form_of_the_samples() {
         let channels: Vec<Vec<f32>> =
             (0..n).map(|i| with.iter().skip(i).step_by(n).copied().collect()).collect();
         let planar: Vec<&[f32]> = channels.iter().map(Vec::as_slice).collect();
-        Stream::new(&subtracting).run(&Planar::new(&planar).unwrap(), &mut got[..]).unwrap();
+        Stream::new(&subtracting).run(&Planar::new(&planar).unwrap(), &mut got.as_mut_slice()).unwrap();
         assert!(got == want, "planar, {}", plain.algorithm());
         for (format, whole) in [PcmFormat::S16Le, PcmFormat::F32Be, PcmFormat::F64Le]
             .into_iter()
@@ -114,7 +114,7 @@ fn offsets_are_subtracted_in_every_form_of_the_samples() {
                 stored.iter().map(|bytes| PcmFrames { layout, channels: count, bytes }).collect();
             let mut bytes = vec![0; 4 * FRAMES * m];
             let mut output = PcmOutput::packed(PcmFormat::F32Le, &mut bytes);
-            Stream::new(&subtracting).run(&parts[..], &mut output).unwrap();
+            Stream::new(&subtracting).run(&parts.as_slice(), &mut output).unwrap();
             let got = bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap()));
             // Doubles are rounded once, where they are stored.
             let close = got.zip(&want).all(|(a, &b)| (a - b).abs() <= 1e-6);
@@ -134,7 +134,7 @@ fn offsets_are_subtracted_on_all_threads() {
     let [mut alone, mut together] = [vec![0f32; 80_000], vec![0f32; 80_000]];
     Stream::new(&plan).process(&x, &mut alone).unwrap();
     let frames = crate::Interleaved::new(&x, 2).unwrap();
-    Stream::new(&plan).run_parallel(&frames, &mut together[..], &pool).unwrap();
+    Stream::new(&plan).run_parallel(&frames, &mut together.as_mut_slice(), &pool).unwrap();
     assert!(alone == together);
 }
 

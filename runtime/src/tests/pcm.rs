@@ -43,7 +43,7 @@ fn check_bytes(bank: &Bank, options: Options, [from, to]: [PcmFormat; 2], bytes:
         stream.reset();
         let mut out = vec![0; want.0.len()];
         let mut output = PcmOutput::packed(to, &mut out);
-        assert_eq!(stream.run(recordings, &mut output), Ok(samples.len()));
+        assert_eq!(stream.run(&recordings, &mut output), Ok(samples.len()));
         let clipped = output.clipped;
         assert!((out, clipped) == want, "{from} to {to}, {:?}", options.algorithm);
     }

@@ -79,9 +79,8 @@ pub(crate) fn rotation_bank() -> Bank {
     recursive_bank(filter)
 }
 
-/// The algorithms for filters of up to 64 taps per phase.
-pub(crate) const FIR_ALGORITHMS: [Algorithm; 2] =
-    [Algorithm::Direct, Algorithm::OverlapSave { transform: Some(64) }];
+/// The algorithms for FIR filters.
+pub(crate) const FIR_ALGORITHMS: [Algorithm; 2] = [Algorithm::Direct, Algorithm::OverlapSave];
 
 pub(crate) fn by(algorithm: Algorithm) -> Options {
     Options { algorithm, ..Options::default() }

@@ -114,25 +114,36 @@ fn every_work(bank: &Bank, algorithm: Algorithm, mut check: impl FnMut(Nasty, us
 }
 
 #[test]
-fn direct_and_overlap_save_filter_a_frame_twice_at_most() {
+fn the_direct_algorithm_filters_a_frame_twice_at_most() {
     let mut noise = Noise(71);
     for (n, m, k) in SHAPES {
         let bank = fir_bank(random_taps(n, m * k, &mut noise), m);
-        for algorithm in [Algorithm::Direct, Algorithm::OverlapSave { transform: Some(64) }] {
-            let mut twice = false;
-            every_work(&bank, algorithm, |nasty, call, usual, work| {
-                let case = format!("{algorithm:?} N {n} M {m} K {k}, {nasty:?} in calls of {call} frames");
-                assert!(
-                    usual.iter().zip(work).all(|(&usual, &work)| (usual..=2 * usual).contains(&work)),
-                    "{case}"
-                );
-                if matches!(nasty, Nasty::Denormal(_)) {
-                    assert_eq!(usual, work, "{case}");
-                }
-                twice |= usual.iter().zip(work).any(|(&usual, &work)| usual > 0 && work == 2 * usual);
-            });
-            assert!(twice, "{algorithm:?}: the bound is reached");
-        }
+        let mut twice = false;
+        every_work(&bank, Algorithm::Direct, |nasty, call, usual, work| {
+            let case = format!("N {n} M {m} K {k}, {nasty:?} in calls of {call} frames");
+            assert!(
+                usual.iter().zip(work).all(|(&usual, &work)| (usual..=2 * usual).contains(&work)),
+                "{case}"
+            );
+            if matches!(nasty, Nasty::Denormal(_)) {
+                assert_eq!(usual, work, "{case}");
+            }
+            twice |= usual.iter().zip(work).any(|(&usual, &work)| usual > 0 && work == 2 * usual);
+        });
+        assert!(twice, "the bound is reached");
+    }
+}
+
+#[test]
+fn overlap_save_filters_a_frame_once() {
+    let mut noise = Noise(74);
+    // Batches are longer than the input with one channel and one phase.
+    for (n, m, k) in SHAPES.into_iter().skip(1) {
+        let bank = fir_bank(random_taps(n, m * k, &mut noise), m);
+        every_work(&bank, Algorithm::OverlapSave, |nasty, call, usual, work| {
+            assert!(usual.iter().any(|&work| work > 0));
+            assert_eq!(usual, work, "N {n} M {m} K {k}, {nasty:?} in calls of {call} frames");
+        });
     }
 }
 

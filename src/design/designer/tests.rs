@@ -96,7 +96,7 @@ fn a_design_that_is_ended_has_its_best_bank_so_far() {
         let spec = spec(method, THESIS);
         let complete = design(&spec, &Options::without_proof()).unwrap().bank.gamma;
         let stop = Stop::default();
-        let at_filters = |stage, _| {
+        let at_filters = |stage| {
             if stage == Stage::Filters {
                 stop.now()
             }
@@ -138,7 +138,7 @@ fn a_design_ends_at_every_stage_with_a_bank() {
         let complete = design(&spec, &Options::without_proof()).unwrap().bank;
         for last in [Stage::Filters, Stage::Realisation, Stage::Proof] {
             let stop = Stop::default();
-            let observer = |stage, _| {
+            let observer = |stage| {
                 if stage == last {
                     stop.now()
                 }
@@ -162,22 +162,47 @@ fn a_design_ends_at_every_stage_with_a_bank() {
     }
 }
 
-/// The limit is one of the time that passes, not of the estimate.
 #[test]
 fn a_design_that_takes_longer_than_its_limit_is_ended() {
     let limit = Duration::from_secs(3);
     let spec = spec("method = \"fir\", taps = 22", THESIS);
-    let late = |stage, effort: Effort| {
-        assert!(effort.shortest < limit.as_secs_f64(), "the estimate is within the limit: {effort}");
+    let late = |stage| {
         if stage == Stage::Filters {
             std::thread::sleep(limit);
         }
     };
-    let options = Options { observer: &late, limits: Limits::Within(limit), ..Options::default() };
+    let options = Options { observer: &late, time_limit: Some(limit), ..Options::default() };
     assert_eq!(design(&spec, &options).unwrap().proof, Err(DesignError::Stopped));
-    let unlimited = Options { limits: Limits::Off, ..Options::default() };
+    let unlimited = Options { time_limit: None, ..Options::default() };
     assert!(design(&spec, &unlimited).unwrap().proof.is_ok());
-    let short = Options { limits: Limits::Within(Duration::from_millis(2)), ..Options::default() };
-    let refused = design(&spec, &short).unwrap_err();
-    assert!(refused.to_string().contains("and 2.0 ms are allowed: use fewer taps"), "{refused}");
+}
+
+/// Other units of the converters' samples and of the output change no relative figure, whether the error is
+/// as large as the target or a small difference.
+#[test]
+fn the_stated_accuracy_does_not_depend_on_units() {
+    // The slow rate is all but enough for the second target.
+    for (numerator, denominator) in [(0.25, "[1.0, 1.0, 0.25]"), (1.0, "[4e11, 1.2e6, 1.0]")] {
+        let figures = |input: f64, output: f64| {
+            let filter = |gain: f64| format!("{{ num = [{:e}], den = {denominator} }}", numerator * gain);
+            let channel = |delay: f64| format!("{{ delay = {delay}, filter = {} }}", filter(input));
+            let text = format!(
+                "fast_period = 1.0\nratio = 2\nlatency = 4\ntarget = {{ filter = {} }}\n\
+                 channel = [{}, {}]\ndesign = {{ method = \"iir\" }}",
+                filter(output),
+                channel(1.2),
+                channel(0.6),
+            );
+            let found = design(&Spec::from_toml(&text, "spec.toml").unwrap(), &Options::without_proof());
+            let gamma = found.unwrap().bank.gamma;
+            (gamma.norm.unwrap() / output, gamma.upper.unwrap() / gamma.norm.unwrap())
+        };
+        let plain = figures(1.0, 1.0);
+        for (input, output) in [(1e-9, 1.0), (1e9, 1.0), (1.0, 1e6), (1.0, 1e9), (1.0, 1e-9), (1e9, 1e-9)] {
+            let scaled = figures(input, output);
+            println!("{input:e} {output:e}: {scaled:?} {plain:?}");
+            assert!((scaled.0 / plain.0 - 1.0).abs() < plain.1 - 1.0 + 1e-9, "{scaled:?} {plain:?}");
+            assert!(((scaled.1 - 1.0) / (plain.1 - 1.0) - 1.0).abs() < 0.01, "{scaled:?} {plain:?}");
+        }
+    }
 }

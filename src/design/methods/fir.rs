@@ -31,9 +31,8 @@ const MISSED_PEAK_LIMIT: usize = 8;
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
     let mut exchange = exchange(plant, settings)?;
     let best = least_gamma(plant, settings.taps, &mut exchange)?;
-    let unfinished = exchange.unfinished_at(best.peak.gain, best.is_missed(), GAMMA_ACCURACY);
     let found = Synthesis::of_least_gamma(plant, best.taps, best.peak, exchange.lower_for_all)?;
-    Ok(Synthesis { unfinished, iterations: exchange.iterations, ..found })
+    Ok(Synthesis { iterations: exchange.iterations, ..found })
 }
 
 /// The taps of [`synthesise`] alone.

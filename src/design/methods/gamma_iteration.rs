@@ -5,7 +5,6 @@ use super::{Filters, GAMMA_ACCURACY, Synthesis};
 use crate::design::DesignError;
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
-use crate::design::unfinished::{EndOfSearch, Unfinished};
 use crate::linalg::{self, Complex};
 use crate::lti::LtiError;
 use crate::lti::peak::{Peak, hinf_norm};
@@ -282,14 +281,6 @@ impl<'a> GammaIteration<'a> {
         DesignError::RiccatiFailed { gamma, states: self.plant.system().order() }
     }
 
-    /// What the search for the least gamma left open, unless it was stopped.
-    pub(super) fn unfinished(&self) -> Option<Unfinished> {
-        if self.is_stopped() || self.is_negligible(self.upper()) {
-            return None;
-        }
-        Unfinished::of(self.lower, self.upper(), GAMMA_ACCURACY, EndOfSearch::Riccati)
-    }
-
     /// `chosen` with the bounds that were found.
     pub(super) fn synthesis(&self, chosen: Evaluated) -> Synthesis {
         let Evaluated { filters, peak } = chosen;
@@ -298,7 +289,6 @@ impl<'a> GammaIteration<'a> {
             peak,
             lower: self.lower.min(peak.gain),
             noncausal: self.noncausal.gain.min(peak.gain),
-            unfinished: None,
             iterations: self.trials,
             robust: None,
         }

@@ -43,8 +43,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
     refine::<Float512>(plant, &mut iteration, MOST_STATES_AT_512_BITS)?;
     let optimum = iteration.best()?;
     let relaxed = relaxed(plant, &mut iteration, &optimum, settings.gamma_margin.unwrap_or(0.0))?;
-    let unfinished = iteration.unfinished();
-    Ok(Synthesis { unfinished, ..iteration.synthesis(relaxed.unwrap_or(optimum)) })
+    Ok(iteration.synthesis(relaxed.unwrap_or(optimum)))
 }
 
 /// Goes on in the precision of `F` where the search so far left the optimum open, for plants of at most

@@ -26,7 +26,6 @@ pub(crate) use super::exchange::GAMMA_ACCURACY;
 use super::limits::Stop;
 use super::plant::LiftedPlant;
 use super::problem::Problem;
-use super::unfinished::Unfinished;
 use crate::lti::StateSpace;
 use crate::lti::peak::Peak;
 use crate::spec::{Method, Spec};
@@ -92,8 +91,6 @@ pub(crate) struct Synthesis {
     pub(crate) lower: f64,
     /// Lower bound of the norm over all filters of any latency. At most `peak.gain`.
     pub(crate) noncausal: f64,
-    /// What the search for the least gamma, or for the least mean square beside it, left open.
-    pub(crate) unfinished: Option<Unfinished>,
     /// Number of interior-point iterations or of Riccati equations solved.
     pub(crate) iterations: usize,
     /// For a robust design.
@@ -120,7 +117,6 @@ impl Synthesis {
             lower: lower.min(peak.gain).max(noncausal),
             peak,
             noncausal,
-            unfinished: None,
             iterations: 0,
             robust: None,
         })

@@ -14,7 +14,6 @@ use crate::design::filters::{FilterResponse, impulse_responses, polyphase};
 use crate::design::plant::LiftedPlant;
 use crate::design::uncertainty::box_plant::{BoxPlant, Combination};
 use crate::design::uncertainty::search::{BoxSearch, WorstErrors};
-use crate::design::unfinished::Unfinished;
 use crate::linalg::{self, CMat};
 use crate::lmi::sampled::{MeanSquareObjective, Point, Problem as SampledProblem, Taps};
 use crate::lti::peak::Peak;
@@ -81,7 +80,6 @@ pub(crate) fn synthesise(
         lower: nominal.lower.min(found.peak.gain),
         noncausal: nominal.noncausal.min(found.peak.gain),
         iterations: nominal.iterations + found.iterations,
-        unfinished: found.unfinished,
         filters: Filters::Fir(found.taps),
         peak: found.peak,
         robust,
@@ -121,7 +119,6 @@ struct RobustTaps {
     scenarios: usize,
     pairs: usize,
     iterations: usize,
-    unfinished: Option<Unfinished>,
 }
 
 /// The exchange. Where the taps are worse between the errors or frequencies that the search looks at, it is
@@ -133,22 +130,20 @@ fn least_worst_norm(
 ) -> Result<RobustTaps, DesignError> {
     let mut exchange = exchange(plant, search, settings)?;
     let mut rounds = 0;
-    let (taps, largest_found, is_missed) = loop {
+    let (taps, largest_found) = loop {
         let found = exchange.optimise_at(Tolerances::gradual(NORM_ACCURACY))?;
         let taps = impulse_responses(&found.taps, settings.taps);
         let worst = worst_of(&exchange.error().search, &taps)?;
         let enough = found.peaks.estimate.max(exchange.lower) * (1.0 + NORM_ACCURACY);
-        let is_missed = worst.peak.gain > enough;
         rounds += 1;
-        if !is_missed || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
-            break (taps, worst.peak.gain, is_missed);
+        if worst.peak.gain <= enough || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
+            break (taps, worst.peak.gain);
         }
         let scenario = exchange.error_mut().search.include(&worst.point);
         if !exchange.add(&[Location { frequency: worst.peak.frequency, scenario }]) {
-            break (taps, worst.peak.gain, is_missed);
+            break (taps, worst.peak.gain);
         }
     };
-    let unfinished = exchange.unfinished_at(largest_found, is_missed, NORM_ACCURACY);
     let peak = plant.fir_norm(&taps)?;
     let norms = RobustNorms { nominal: peak.gain, largest_found };
     let (lower, iterations) = (exchange.lower_for_all, exchange.iterations);
@@ -156,7 +151,7 @@ fn least_worst_norm(
     let mut scenarios: Vec<_> = exchange.locations().iter().map(|location| &location.scenario).collect();
     scenarios.sort();
     scenarios.dedup();
-    Ok(RobustTaps { peak, norms, lower, scenarios: scenarios.len(), pairs, iterations, taps, unfinished })
+    Ok(RobustTaps { peak, norms, lower, scenarios: scenarios.len(), pairs, iterations, taps })
 }
 
 /// The error of fixed taps over the box.

@@ -7,13 +7,14 @@ mod upper;
 
 use super::DesignError;
 use super::limits::Stop;
+use super::plant::LiftedPlant;
+use super::problem::Problem;
 use crate::bank::{Bank, Certificate, GainWitness, Gamma, Proof};
 use crate::linalg::{self, CMat};
 use crate::verify::{EnclosedErrorSystem, Strictness, Verified};
 pub(super) use box_bound::{attach_box_proof, worst_case};
 pub(super) use enclosed_norm::resolved_norm;
 use enclosed_norm::{EnclosedGains, is_zero};
-pub(super) use upper::MAX_SEARCHED_STATES;
 use upper::certificate;
 
 /// Relative width of a proven interval above which the norm is looked for in the arithmetic of `verify`:
@@ -53,12 +54,6 @@ pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
 pub(super) fn proven_gain(bank: &Bank, frequency: f64) -> Result<Option<f64>, DesignError> {
     let error = EnclosedErrorSystem::new(bank)?;
     Ok(EnclosedGains(&error).at(frequency)?.map(|(gain, _)| gain))
-}
-
-/// Whether the norm of a bank is zero up to rounding, so that no search can make it less.
-pub(super) fn has_no_error(bank: &Bank) -> bool {
-    let is_zero = |error: EnclosedErrorSystem<'_>| bank.gamma.norm.is_some_and(|norm| is_zero(norm, &error));
-    EnclosedErrorSystem::new(bank).is_ok_and(is_zero)
 }
 
 /// Searches for the certificate of the bank's gamma. Returns the proof and the bounds that it proves,
@@ -134,8 +129,8 @@ fn enclosed_norm(
 fn without_certificate(bank: &Bank) -> Result<Gamma, DesignError> {
     let error = EnclosedErrorSystem::new(bank)?;
     let Some((norm, _)) = EnclosedGains(&error).peak(None)? else { return Ok(bank.gamma) };
-    let computed = Gamma::computed(norm, 0.0, 0.0, 0.0).upper;
-    let upper = [computed, bank.gamma.upper].into_iter().flatten().reduce(f64::max);
+    let computed = norm * (1.0 + LiftedPlant::new(&Problem::of_bank(bank)?).accuracy(norm)?);
+    let upper = [Some(computed), bank.gamma.upper].into_iter().flatten().reduce(f64::max);
     Ok(Gamma { norm: Some(norm), upper, ..bank.gamma }.with_bounds_below_the_norm())
 }
 

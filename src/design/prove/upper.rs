@@ -42,7 +42,7 @@ const CORRECTION_DIGITS: [usize; 2] = [9, 17];
 const NOISE_SHARE_OF_EXCESS: f64 = 1e-3;
 /// Maximum number of states of an error system for which the search tries to find a certificate. It needs
 /// eigenvalues of matrices twice as large.
-pub(in crate::design) const MAX_SEARCHED_STATES: usize = 512;
+const MAX_SEARCHED_STATES: usize = 512;
 /// Noise added to every state in the choice of coordinates, relative to the root of gamma and its excess
 /// (and of the number of states). With it no direction is unobservable. The noise would raise the norm by
 /// only a hundredth of the excess.

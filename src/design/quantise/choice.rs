@@ -4,7 +4,6 @@
 //! search finds good integers and not always the best, so it scans neighbouring word lengths, from a first
 //! guess onwards, until one holds the loss and the next shorter one does not.
 
-use super::digits::{fewest_digits, is_left_out, without_zeros};
 use super::problem::Candidate;
 use super::quantiser::Quantiser;
 use super::{QuantisationProblem, WordChoice, WordStudy};
@@ -24,13 +23,11 @@ pub(in crate::design) struct Allowance {
     pub(in crate::design) loss_db: f64,
     /// The most bits.
     pub(in crate::design) most: WordLengths,
-    /// Whether there are to be few signed digits.
-    pub(in crate::design) by_digits: bool,
 }
 
 /// Integers near the filters of `problem`, whose norm is `real_gamma`, that lose no more SNR than allowed:
-/// of the fewest bits that were found, and of these as many taps as possible left out; or of the fewest
-/// signed digits. Among these gamma decides.
+/// of the fewest bits that were found, and of these as many taps as possible left out. Among these gamma
+/// decides.
 ///
 /// # Errors
 /// [`DesignError::WordsLoseMore`] if the most bits lose more, else as [`super::quantise`].
@@ -39,28 +36,19 @@ pub(in crate::design) fn quantise_within(
     real_gamma: f64,
     allowance: &Allowance,
 ) -> Result<(FixedPoint, WordStudy), DesignError> {
-    let Allowance { loss_db, most, by_digits } = allowance;
-    let mut quantiser = Quantiser::new(problem)?;
-    quantiser.most_mean_square = quantiser.error.real_mean_square * 10f64.powf(loss_db / 10.0);
+    let Allowance { loss_db, most } = allowance;
+    let quantiser = Quantiser::within(problem, *loss_db)?;
     let lengths = Lengths::up_to(most);
     let (found, least) = scan(&quantiser, &lengths, allowance)?;
-    let few_taps = leave_out(&quantiser, &found[least])?;
-    let signed_digits_of_fewest_bits = few_taps.fixed_point.signed_digits();
-    let chosen = match by_digits {
-        true => fewest_digits(&quantiser, &[&found[least], &few_taps], most)?,
-        false => few_taps,
-    };
+    let chosen = leave_out(&quantiser, &found[least])?;
     let beside = &found[least.saturating_sub(BESIDE)..(least + BESIDE + 1).min(found.len())];
     let words = beside.iter().map(|found| quantiser.loss(found, None)).collect::<Result<_, _>>()?;
     let snr_loss_db = quantiser.mean_square_loss_db(&chosen);
     let fixed_point = without_zeros(chosen.fixed_point);
     let choice = WordChoice {
         allowed_db: *loss_db,
-        by_digits: *by_digits,
         snr_loss_db,
         taps_left_out: (0..problem.taps[0].len()).filter(|&n| is_left_out(&fixed_point, n)).count(),
-        signed_digits: fixed_point.signed_digits(),
-        signed_digits_of_fewest_bits,
     };
     Ok((fixed_point, WordStudy { real_gamma, words, choice: Some(choice) }))
 }
@@ -139,4 +127,21 @@ fn leave_out(quantiser: &Quantiser<'_>, found: &Candidate) -> Result<Candidate, 
         }
     }
     Ok(best)
+}
+
+fn is_left_out(words: &FixedPoint, n: usize) -> bool {
+    words.integers.iter().all(|list| list[n] == 0)
+}
+
+/// Taps that are zero in all channels get no bits.
+fn without_zeros(words: FixedPoint) -> FixedPoint {
+    if words.is_zero() {
+        return words;
+    }
+    let bits = |n: usize| if is_left_out(&words, n) { 0 } else { words.bits.bits(n) };
+    let all: Vec<u32> = (0..words.integers[0].len()).map(bits).collect();
+    if !all.contains(&0) {
+        return words;
+    }
+    FixedPoint { bits: WordLengths::PerTap(all), ..words }
 }

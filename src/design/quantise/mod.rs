@@ -2,25 +2,19 @@
 //! least distance from the optimal taps.
 //!
 //! Rounding each tap by itself wastes gamma, because noise in the taps matters only where the channels carry
-//! signal. The search has two stages:
+//! signal. The search (`search`) has two stages:
 //! 1. The closest point of a lattice in the quadratic form of the mean-square error that a change of taps
 //!    adds (`problem`, `lattice`). The weights of the form grow at the frequencies where the last integers
 //!    were worst (Lawson's method of minimax approximation).
 //! 2. A descent on gamma itself, from the best of these points (`descent`).
 //!
 //! The scale is the finest power of two at which the taps fit their bits, or one step finer with the
-//! largest taps clipped. Where that costs more than 0.05 dB, taps that are smaller than the optimal ones
-//! and still have almost their gamma are tried with finer steps (`quantiser`), and banks of few taps
-//! are searched through at all scales (`enumeration`). The zero output is always a candidate. Among all
-//! candidates with about the least gamma, the one with the least mean-square error and converter noise at
-//! the output is chosen.
+//! largest taps clipped. The zero output is always a candidate. Among all candidates with about the least
+//! gamma, the one with the least mean-square error and converter noise at the output is chosen.
 
 mod choice;
 mod descent;
-mod digits;
-mod enumeration;
 mod lattice;
-mod phases;
 mod problem;
 mod quantiser;
 mod search;
@@ -70,16 +64,10 @@ pub struct WordLoss {
 pub struct WordChoice {
     /// The most that may be lost, in decibels.
     pub allowed_db: f64,
-    /// Whether there are few digits, and not few bits.
-    pub by_digits: bool,
     /// What these integers lose.
     pub snr_loss_db: f64,
     /// Taps that are zero in all channels.
     pub taps_left_out: usize,
-    /// Canonical signed digits of all taps.
-    pub signed_digits: u32,
-    /// Those of the integers of the fewest bits.
-    pub signed_digits_of_fewest_bits: u32,
 }
 
 impl WordStudy {

@@ -11,12 +11,12 @@
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::design::error_grid::ErrorGrid;
-use crate::design::filters::polyphase;
+use crate::design::filters::{polyphase, response};
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lmi::sampled::Point;
-use crate::spec::WordLengths;
+use crate::spec::{MAX_BITS, WordLengths};
 
 /// Taps to be replaced by integers times a power of two.
 #[derive(Debug, Clone, Copy)]
@@ -95,14 +95,48 @@ impl<'a> TapError<'a> {
     /// The mean square that a unit of each channel's tap adds.
     pub(super) fn powers(&self) -> Vec<f64> {
         let correlations = self.forms.correlations(&self.grid.mean_weights(), 1);
-        let noise = |i: usize| self.problem.noise.get(i).copied().unwrap_or(0.0);
-        (0..self.problem.taps.len()).map(|i| correlations.power(i) + noise(i)).collect()
+        (0..self.problem.taps.len()).map(|i| correlations.power(i) + noise(self.problem.noise, i)).collect()
+    }
+
+    /// The real taps of least mean square of the error plus the converters' noise at the output.
+    ///
+    /// # Errors
+    /// [`DesignError::Linalg`] if rounding errors make the form indefinite.
+    pub(super) fn taps_of_least_square(&self) -> Result<Vec<Vec<f64>>, DesignError> {
+        let (problem, weights) = (self.problem, self.grid.mean_weights());
+        let lags = polyphase(problem.taps, self.ratio);
+        let errors = self.points.iter().map(|point| point.error(&response(&lags, point.omega)));
+        let errors: Vec<CMat> = errors.collect();
+        let correlations = self.forms.correlations(&weights, lags.len());
+        let mut least = problem.taps.to_vec();
+        for phase in 0..self.ratio.min(least[0].len()) {
+            let taps = Tap::of_phase(phase, self, &WordLengths::Same(MAX_BITS));
+            let descent = |tap: &Tap| {
+                let fit = self.points.iter().zip(&errors).zip(&weights).map(|((point, error), weight)| {
+                    let phasor = Complex::from_polar(*weight, point.omega * tap.lag as f64);
+                    (phasor * point.h.row(tap.channel).dotc(&error.row(phase))).re
+                });
+                let own = least[tap.channel][phase + tap.lag * self.ratio];
+                fit.sum::<f64>() - noise(problem.noise, tap.channel) * own
+            };
+            let descent = Mat::from_iterator(taps.len(), 1, taps.iter().map(descent));
+            let steps = linalg::solve_positive(&correlations.form(&taps, problem.noise), &descent)?;
+            for (tap, step) in taps.iter().zip(steps.iter()) {
+                least[tap.channel][phase + tap.lag * self.ratio] += step;
+            }
+        }
+        Ok(least)
     }
 
     /// Estimate of gamma of integer taps.
     pub(super) fn gamma(&self, fixed_point: &FixedPoint) -> Result<f64, DesignError> {
         Ok(self.grid.peaks(&polyphase(&fixed_point.taps(), self.ratio), 0.0)?.estimate)
     }
+}
+
+/// The noise power of a channel; none is stated of a list that is empty.
+fn noise(powers: &[f64], channel: usize) -> f64 {
+    powers.get(channel).copied().unwrap_or(0.0)
 }
 
 /// `sum_i noise_i |f_i|^2`.
@@ -116,7 +150,7 @@ fn output_noise(noise: &[f64], taps: &[Vec<f64>]) -> f64 {
 
 /// Added to the diagonal, because the form is singular for equal channels. Relative to each entry, because
 /// channels may differ by many decades.
-pub(super) const RIDGE: f64 = 1e-12;
+const RIDGE: f64 = 1e-12;
 
 /// A tap of a phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -173,15 +207,22 @@ impl Forms {
 }
 
 impl Correlations {
-    /// L with `L L' = Q` for the taps given.
+    /// L with `L L' = Q` for the taps given, with the noise powers of their channels.
     ///
     /// # Errors
     /// [`DesignError::Linalg`] if rounding errors make the form indefinite.
-    pub(super) fn factor(&self, taps: &[Tap]) -> Result<Mat, DesignError> {
+    pub(super) fn factor(&self, taps: &[Tap], powers: &[f64]) -> Result<Mat, DesignError> {
+        Ok(linalg::cholesky(&self.form(taps, powers))?)
+    }
+
+    fn form(&self, taps: &[Tap], powers: &[f64]) -> Mat {
         let n = taps.len();
         let mut form = Mat::from_fn(n, n, |r, c| self.between(taps[r], taps[c]));
-        (0..n).for_each(|i| form[(i, i)] += RIDGE * form[(i, i)] + f64::MIN_POSITIVE);
-        Ok(linalg::cholesky(&form)?)
+        for (i, tap) in taps.iter().enumerate() {
+            form[(i, i)] += noise(powers, tap.channel);
+            form[(i, i)] += RIDGE * form[(i, i)] + f64::MIN_POSITIVE;
+        }
+        form
     }
 
     /// The form of a single tap of channel i.
@@ -189,7 +230,7 @@ impl Correlations {
         self.by_lag[0][(i, i)]
     }
 
-    pub(super) fn between(&self, a: Tap, b: Tap) -> f64 {
+    fn between(&self, a: Tap, b: Tap) -> f64 {
         // The sum for -d is the transposed one.
         if a.lag >= b.lag {
             self.by_lag[a.lag - b.lag][(a.channel, b.channel)]

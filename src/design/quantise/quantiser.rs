@@ -1,32 +1,20 @@
-//! The search at all scales in question, and the choice among its candidates. Real taps that are smaller
-//! than the optimal ones and cost some gamma are tried too, because few bits hold them with a finer step.
+//! The search at the two scales in question, and the choice among its candidates.
 
-use super::enumeration::Enumeration;
 use super::lattice::Span;
-use super::phases::Phases;
 use super::problem::{Candidate, QuantisationProblem, TapError};
 use super::search::Search;
 use super::{WordLoss, decades};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
-use crate::design::filters::{impulse_responses, polyphase};
-use crate::design::methods::tap_lags;
-use crate::lmi::sampled::{MeanSquareObjective, Problem, mean_square_under_cap};
 use crate::spec::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
-use std::ops::RangeInclusive;
-use std::sync::OnceLock;
-use std::thread::ScopedJoinHandle;
+use rayon::prelude::*;
 
 /// Relative difference of gamma below which the mean square decides: 0.001 dB.
 pub(super) const GAMMA_TIE: f64 = 1e-4;
-/// Relative excess over the gamma of the real taps from which more scales are searched: 0.05 dB.
-const LOSS_FOR_MORE_SCALES: f64 = 5.8e-3;
 /// Integers that lower the gamma of zero output by less than this share do no better than zero output.
 const LEAST_EFFECT_OF_INTEGERS: f64 = 1e-6;
 /// Real taps that lower it by more than this share have an effect, which integers should have too.
 const LEAST_EFFECT_OF_REAL_TAPS: f64 = 1e-3;
-/// Scales of few taps that are searched beyond the finest one that holds the optimal taps.
-const MAX_FINER_SCALES: i32 = 40;
 
 impl Candidate {
     /// Whether gamma is smaller, or about equal with a smaller mean square.
@@ -41,9 +29,9 @@ impl Candidate {
 pub(super) struct Quantiser<'a> {
     pub(super) error: TapError<'a>,
     /// The mean square that integers should keep to; infinite where only gamma counts.
-    pub(super) most_mean_square: f64,
-    /// Computed when first needed.
-    smaller: OnceLock<Result<Vec<SmallerTaps>, DesignError>>,
+    most_mean_square: f64,
+    /// The real taps of least mean square, if that counts.
+    of_least_square: Option<Vec<Vec<f64>>>,
 }
 
 impl<'a> Quantiser<'a> {
@@ -52,8 +40,18 @@ impl<'a> Quantiser<'a> {
     /// # Errors
     /// [`DesignError::Lti`] if the plant is not stable, [`DesignError::Linalg`] if a decomposition fails.
     pub(super) fn new(problem: QuantisationProblem<'a>) -> Result<Self, DesignError> {
+        Ok(Self { error: TapError::new(problem)?, most_mean_square: f64::INFINITY, of_least_square: None })
+    }
+
+    /// The same for integers whose mean square is at most `loss_db` above that of the real taps.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(super) fn within(problem: QuantisationProblem<'a>, loss_db: f64) -> Result<Self, DesignError> {
         let error = TapError::new(problem)?;
-        Ok(Self { error, most_mean_square: f64::INFINITY, smaller: OnceLock::new() })
+        let most_mean_square = error.real_mean_square * 10f64.powf(loss_db / 10.0);
+        let of_least_square = Some(error.taps_of_least_square()?);
+        Ok(Self { error, most_mean_square, of_least_square })
     }
 
     /// The best integers of the given bits; `fraction_bits` fixes their scale.
@@ -66,118 +64,44 @@ impl<'a> Quantiser<'a> {
         fraction_bits: Option<i32>,
     ) -> Result<Candidate, DesignError> {
         let finest = fraction_bits.unwrap_or_else(|| self.finest_that_fits(bits));
-        let fitting = Search::new(self.error.problem.taps, &self.error, bits, finest);
-        let zero_output = self.error.candidate(fitting.zero_output())?;
-        let mut found = vec![zero_output.clone()];
-        found.extend(fitting.run()?);
+        let mut found = self.candidates(bits, finest)?;
         if fraction_bits.is_none() && finest < MAX_FRACTION_BITS {
-            found.extend(Search::new(self.error.problem.taps, &self.error, bits, finest + 1).run()?);
+            found.extend(self.candidates(bits, finest + 1)?);
         }
-        let is_worse = least_gamma(&found) > self.error.real_gamma * (1.0 + LOSS_FOR_MORE_SCALES);
-        if is_worse && !self.error.problem.stop.is_due() {
-            match fraction_bits {
-                None => self.search_finer_scales(bits, finest, &mut found)?,
-                Some(scale) => self.search_few_taps(bits, scale..=scale, &mut found)?,
-            }
-        }
-        if self.most_mean_square.is_finite() {
-            found.extend(self.improved(&found)?);
-        }
-        Ok(self.best(found).unwrap_or(zero_output))
+        let zero_output = self.error.candidate(Search::new(&self.error, bits, finest).zero_output())?;
+        Ok(self.best(found, zero_output.gamma).unwrap_or(zero_output))
     }
 
-    /// From the candidate of least mean square, one near the real taps of least mean square.
-    fn improved(&self, found: &[Candidate]) -> Result<Option<Candidate>, DesignError> {
-        let least = found.iter().min_by(|a, b| a.mean_square.total_cmp(&b.mean_square));
-        let improved = |start: &Candidate| {
-            let mut phases = Phases::new(&self.error, &start.fixed_point, start.mean_square);
-            phases.near_optimum()?;
-            self.error.candidate(phases.fixed_point(&start.fixed_point))
-        };
-        least.map(improved).transpose()
+    fn candidates(&self, bits: &WordLengths, fraction_bits: i32) -> Result<Vec<Candidate>, DesignError> {
+        let search = Search::new(&self.error, bits, fraction_bits);
+        let mut found = search.run()?;
+        if let Some(taps) = &self.of_least_square {
+            found.push(search.near_least_square(taps)?);
+        }
+        Ok(found)
     }
 
-    /// The candidate of least mean square: of those of about the least gamma that keep to the mean square
-    /// that is allowed, or of all where none does.
-    fn best(&self, mut found: Vec<Candidate>) -> Option<Candidate> {
-        let keeps = |found: &Candidate| found.mean_square <= self.most_mean_square;
-        if found.iter().any(keeps) {
-            found.retain(keeps);
-            let cap = least_gamma(&found) * (1.0 + self.error.problem.gamma_margin.max(GAMMA_TIE));
+    /// The candidate of least mean square: of those of about the least gamma, which is not above that of
+    /// zero output, that keep to the mean square that is allowed, or of all where none does.
+    fn best(&self, mut found: Vec<Candidate>, of_zero_output: f64) -> Option<Candidate> {
+        if found.iter().any(|found| self.keeps(found)) {
+            found.retain(|found| self.keeps(found));
+            let least = found.iter().map(|found| found.gamma).fold(f64::INFINITY, f64::min);
+            let alike = least * (1.0 + self.error.problem.gamma_margin.max(GAMMA_TIE));
+            let cap = alike.min(of_zero_output.max(least));
             found.retain(|found| found.gamma <= cap);
         }
         found.into_iter().min_by(|a, b| a.mean_square.total_cmp(&b.mean_square))
     }
 
-    /// Adds candidates with steps finer than those that hold the optimal taps: near smaller taps, and from
-    /// the enumeration of few taps.
-    fn search_finer_scales(
-        &self,
-        bits: &WordLengths,
-        finest: i32,
-        found: &mut Vec<Candidate>,
-    ) -> Result<(), DesignError> {
-        let mut last = finest;
-        let smaller = self.smaller.get_or_init(|| smaller_taps(&self.error));
-        for smaller in smaller.as_ref().map_err(DesignError::clone)? {
-            let scale = self.finest_that_holds(&smaller.taps, bits);
-            if least_gamma(found) <= smaller.gamma {
-                break;
-            }
-            if scale > last {
-                for scale in [scale, scale + 1].into_iter().filter(|&scale| scale <= MAX_FRACTION_BITS) {
-                    found.extend(Search::new(&smaller.taps, &self.error, bits, scale).run()?);
-                }
-                last = scale;
-            }
-        }
-        let coarsest = (finest - 1).max(-MAX_FRACTION_BITS);
-        self.search_few_taps(bits, coarsest..=(finest + MAX_FINER_SCALES).min(MAX_FRACTION_BITS), found)
-    }
-
-    /// Adds the best integers of a bank of few taps.
-    fn search_few_taps(
-        &self,
-        bits: &WordLengths,
-        scales: RangeInclusive<i32>,
-        found: &mut Vec<Candidate>,
-    ) -> Result<(), DesignError> {
-        let Some(enumeration) = Enumeration::new(&self.error, bits) else { return Ok(()) };
-        for fraction_bits in scales {
-            let bar = least_gamma(found);
-            if !enumeration.may_reach(fraction_bits, bar)? {
-                break;
-            }
-            for integers in enumeration.better_than(bar, fraction_bits)? {
-                found.push(self.error.candidate(FixedPoint {
-                    bits: bits.clone(),
-                    fraction_bits,
-                    integers,
-                })?);
-            }
-        }
-        Ok(())
-    }
-
-    /// [`Self::quantise`] for each word length, on one thread each where threads can be had.
+    /// [`Self::quantise`] for each word length.
     pub(super) fn quantise_all(
         &self,
         all: &[WordLengths],
         fraction_bits: Option<i32>,
     ) -> Result<Vec<Candidate>, DesignError> {
-        std::thread::scope(|scope| {
-            let begin = |bits| {
-                let search = move || self.quantise(bits, fraction_bits);
-                (bits, std::thread::Builder::new().spawn_scoped(scope, search))
-            };
-            let searches: Vec<_> = all.iter().map(begin).collect();
-            let end = |(bits, thread): (&WordLengths, std::io::Result<ScopedJoinHandle<'_, _>>)| match thread
-            {
-                Ok(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
-                Err(_) => self.quantise(bits, fraction_bits),
-            };
-            searches.into_iter().map(end).collect()
-        })
+        let found: Vec<_> = all.par_iter().map(|bits| self.quantise(bits, fraction_bits)).collect();
+        found.into_iter().collect()
     }
 
     /// Whether integers are no better than zero output, while the real taps are.
@@ -235,7 +159,7 @@ impl<'a> Quantiser<'a> {
     /// Estimate of gamma of the real taps, each rounded by itself at the finest scale at which all fit.
     pub(super) fn rounded(&self, bits: &WordLengths, fraction_bits: Option<i32>) -> Result<f64, DesignError> {
         let finest = fraction_bits.unwrap_or_else(|| self.finest_that_fits(bits));
-        self.error.gamma(&Search::new(self.error.problem.taps, &self.error, bits, finest).rounded())
+        self.error.gamma(&Search::new(&self.error, bits, finest).rounded())
     }
 
     /// The most fraction bits, within their limits, with which each rounded tap fits its bits. Taps that are
@@ -266,54 +190,4 @@ impl<'a> Quantiser<'a> {
         let (coarsest, finest) = (within(-2 - magnitude), within(widest - 1 - magnitude));
         (coarsest..=finest).rev().find(|&scale| fits(scale)).unwrap_or(coarsest)
     }
-}
-
-fn least_gamma(found: &[Candidate]) -> f64 {
-    found.iter().map(|found| found.gamma).fold(f64::INFINITY, f64::min)
-}
-
-/// gamma of the smaller taps over that of the optimal ones, in decibels.
-const LOSSES_DB: [f64; 12] = [0.02, 0.1, 0.3, 1.0, 2.0, 4.0, 7.0, 11.0, 16.0, 24.0, 36.0, 60.0];
-/// Weight of the mean-square error relative to that of the taps.
-const ERROR_WEIGHT: f64 = 1e-6;
-/// Relative accuracy of that mean square: these taps only begin the search for integers.
-const MEAN_SQUARE_ACCURACY: f64 = 1e-3;
-
-/// Taps with the gamma that they were allowed.
-struct SmallerTaps {
-    gamma: f64,
-    taps: Vec<Vec<f64>>,
-}
-
-/// For each of some gammas below that of zero output the taps of least Euclidean norm, the largest taps
-/// first.
-///
-/// # Errors
-/// [`DesignError::Linalg`] if a decomposition fails.
-fn smaller_taps(error: &TapError<'_>) -> Result<Vec<SmallerTaps>, DesignError> {
-    let zero_output = zero_output(error);
-    let caps = LOSSES_DB.map(|db| error.real_gamma * 10f64.powf(db / 20.0));
-    caps.into_iter()
-        .take_while(|cap| *cap < zero_output)
-        .map_while(|cap| under_cap(error, cap).transpose())
-        .collect()
-}
-
-/// An upper bound of the gamma of zero taps.
-fn zero_output(error: &TapError<'_>) -> f64 {
-    error.points.iter().map(|point| point.w.norm()).fold(0.0, f64::max)
-}
-
-/// `None` if gamma is zero up to rounding: no cap lies above it.
-fn under_cap(error: &TapError<'_>, cap: f64) -> Result<Option<SmallerTaps>, DesignError> {
-    let (length, channels) = (error.problem.taps[0].len(), error.problem.taps.len());
-    let (points, mut weights) = error.grid.coarse();
-    weights.iter_mut().for_each(|weight| *weight *= ERROR_WEIGHT);
-    let lags = tap_lags(error.ratio, length);
-    let problem = Problem::new(points, lags);
-    let objective = MeanSquareObjective { weights, noise: vec![1.0; channels] };
-    let start = polyphase(error.problem.taps, error.ratio);
-    let is_due = || error.problem.stop.is_due();
-    let found = mean_square_under_cap(&problem, &objective, cap, &start, MEAN_SQUARE_ACCURACY, &is_due)?;
-    Ok(found.map(|found| SmallerTaps { gamma: cap, taps: impulse_responses(&found.taps, length) }))
 }

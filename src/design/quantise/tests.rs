@@ -72,7 +72,7 @@ fn small_banks_reach_what_trying_all_integers_reaches() {
         let quantiser = quantiser(&plant, &taps).unwrap();
         let found = quantiser.quantise(&words, None).unwrap();
         let scale = found.fixed_point.fraction_bits;
-        let search = Search::new(quantiser.error.problem.taps, &quantiser.error, &words, scale);
+        let search = Search::new(&quantiser.error, &words, scale);
         let all = brute_force(&plant, &search.rounded(), 1);
         assert!(found.gamma <= all * 1.001, "{bits} bits: {} found, {all} is there", found.gamma);
         assert!(found.gamma <= quantiser.rounded(&words, None).unwrap() * (1.0 + GAMMA_TIE));
@@ -198,14 +198,7 @@ fn the_mean_square_decides_among_integers_of_like_gamma() {
         let found = quantiser.quantise(&WordLengths::Same(bits), None).unwrap();
         let tried = [0, 1].map(|finer| {
             let words = WordLengths::Same(bits);
-            Search::new(
-                quantiser.error.problem.taps,
-                &quantiser.error,
-                &words,
-                quantiser.finest_that_fits(&words) + finer,
-            )
-            .run()
-            .unwrap()
+            Search::new(&quantiser.error, &words, quantiser.finest_that_fits(&words) + finer).run().unwrap()
         });
         let cap = found.gamma * (1.0 + 1e-9);
         assert!(
@@ -232,7 +225,7 @@ fn a_scale_at_which_all_that_is_left_does_nothing_is_refused() {
         assert!(error.to_string().contains("up to fraction_bits = 1"), "{error}");
     }
     // Taps that are cut off but do something are kept.
-    assert!(quantise(problem(&plant, &taps), 1.0, &WordLengths::Same(4), Some(8)).is_ok());
+    assert!(quantise(problem(&plant, &taps), 1.0, &WordLengths::Same(4), Some(4)).is_ok());
 }
 
 #[test]
@@ -278,4 +271,39 @@ fn a_loss_over_nothing_is_a_number() {
     assert_eq!(study(0.0).loss_db(0.0), 0.0);
     assert_eq!(study(0.0).loss_db(1e-17), f64::INFINITY);
     assert!((study(0.5).loss_db(5.0) - 20.0).abs() < 1e-12);
+}
+
+/// No other taps have a smaller mean square, error and noise together: judged by the error itself.
+#[test]
+fn the_taps_of_least_square_are_a_minimum() {
+    let (plant, taps) = optimum(&THESIS.replace("taps = 22", "taps = 7"));
+    let noise = [1e-3, 4e-3];
+    let problem = QuantisationProblem { noise: &noise, ..problem(&plant, &taps) };
+    let quantiser = Quantiser::within(problem, 0.1).unwrap();
+    let square = |taps: &[Vec<f64>]| {
+        let own = taps.iter().zip(noise).map(|(f, power)| power * f.iter().map(|x| x * x).sum::<f64>());
+        quantiser.error.grid.mean_square(&polyphase(taps, 2)) + own.sum::<f64>()
+    };
+    let least = quantiser.error.taps_of_least_square().unwrap();
+    assert!(square(&least) < 0.99 * square(&taps));
+    for (channel, n) in (0..2).flat_map(|channel| (0..7).map(move |n| (channel, n))) {
+        for step in [1e-3, -1e-3] {
+            let mut moved = least.clone();
+            moved[channel][n] += step;
+            assert!(square(&moved) > square(&least), "{channel} {n} {step}");
+        }
+    }
+}
+
+#[test]
+fn the_same_bits_for_any_number_of_threads() {
+    let (plant, taps) = optimum(&THESIS.replace("taps = 22", "taps = 8"));
+    let bits = || quantise(problem(&plant, &taps), 1.0, &WordLengths::Same(6), None).unwrap();
+    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let [one, three] = [1, 3].map(|threads| pool(threads).install(bits));
+    assert_eq!(one.0, three.0);
+    let losses = |study: &WordStudy| -> Vec<u64> {
+        study.words.iter().map(|word| word.mean_square_loss_db.to_bits()).collect()
+    };
+    assert_eq!(losses(&one.1), losses(&three.1));
 }

@@ -1,26 +1,22 @@
-//! Order reduction: a bank of few states with as small an error as the search finds.
+//! Order reduction: a bank of few states, by frequency-weighted balanced truncation.
 //!
 //! The error K = W - F H is affine in the bank F, so replacing F by F_r costs `||(F - F_r) H||`. The states
-//! are therefore balanced with the inputs that the plant gives them (frequency-weighted balancing, Enns
-//! 1984), not with white noise. The first samples of the response may stay an FIR head, which costs one
-//! state per channel and slow period; several splits of the states between head and recursive tail are
-//! tried.
+//! are therefore balanced with the inputs that the plant gives them, and not with white noise: H is the input
+//! weight of Enns (*Model reduction with balanced realizations: an error bound and a frequency weighted
+//! generalization*, CDC 1984). Without an output weight every truncation is stable.
 //!
-//! For given dynamics, the output matrices C and D are optimised again, which is a convex problem
-//! (`dynamics`). The poles are then refined with the output matrices eliminated (`pole_refinement`,
-//! variable projection). This last step is a local search: the gamma reported is that of the bank found, not
-//! the least of all banks of its order.
+//! For the recursion that is left, the output matrices C and D are optimised again, which is a convex problem
+//! (`plant_samples`). Better poles may exist: the gamma reported is that of the bank found, not the least of
+//! all banks of its order.
 
-mod descent;
-mod dynamics;
 mod order_search;
 mod plant_samples;
-mod pole_refinement;
+mod truncation;
 
 use crate::design::DesignError;
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
-use crate::lti::{FirWithTail, StateSpace};
+use crate::lti::StateSpace;
 use crate::spec::Reduction;
 use order_search::OrderSearch;
 
@@ -42,9 +38,6 @@ pub(crate) struct ReductionProblem<'a> {
     pub(crate) bank: &'a StateSpace,
     /// States of the full bank in the form that is written.
     pub(crate) order: usize,
-    /// States per slow period of FIR head: the channels of the written bank. The plant may have fewer,
-    /// because equal channels are merged.
-    pub(crate) width: usize,
     /// The quantity that is minimised.
     pub(crate) aim: Aim,
     /// Relative excess of gamma granted to the mean square.
@@ -85,14 +78,6 @@ pub struct OrderReduction {
     /// The order/error trade-off: all orders searched, ascending. All orders below the full one where that
     /// is cheap.
     pub orders: Vec<OrderErrorPoint>,
-    /// The first computation that failed while the poles of a truncated bank were refined, if one did. A
-    /// better bank of that order may exist.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "text_of")]
-    pub unrefined: Option<DesignError>,
-}
-
-fn text_of<S: serde::Serializer>(failure: &Option<DesignError>, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_str(&failure.as_ref().map(ToString::to_string).unwrap_or_default())
 }
 
 /// The reduced bank and the order/error trade-off. No bank is returned if the full one is chosen.
@@ -102,12 +87,13 @@ fn text_of<S: serde::Serializer>(failure: &Option<DesignError>, serializer: S) -
 pub(crate) fn reduce(
     problem: &ReductionProblem<'_>,
     reduction: Reduction,
-) -> Result<(Option<FirWithTail>, OrderReduction), DesignError> {
+) -> Result<(Option<StateSpace>, OrderReduction), DesignError> {
     let mut search = OrderSearch::new(problem)?;
     let order = match reduction {
-        Reduction::Order(order) => search.at_most(order)?,
+        Reduction::Order(order) => order.min(problem.order),
         Reduction::Loss(db) => search.within(db)?,
     };
+    search.around(order)?;
     Ok(search.finish(order))
 }
 

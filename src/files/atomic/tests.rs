@@ -29,6 +29,18 @@ fn leaves_nothing_when_dropped() {
     assert!(names(folder.path()).is_empty());
 }
 
+/// Not one that only its owner may read.
+#[cfg(unix)]
+#[test]
+fn a_new_file_has_the_permissions_of_an_ordinary_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let (target, ordinary) = (folder.path().join("out.wav"), folder.path().join("ordinary"));
+    AtomicFile::create(&target, false).unwrap().commit().unwrap();
+    fs::write(&ordinary, "").unwrap();
+    let permissions = |path: &Path| path.metadata().unwrap().permissions();
+    assert_eq!(permissions(&target), permissions(&ordinary));
+}
+
 #[test]
 fn replaces_only_when_asked() {
     let folder = tempfile::tempdir().unwrap();
@@ -57,17 +69,6 @@ fn what_came_in_between_is_kept() {
 }
 
 #[test]
-fn hidden_names_of_others_are_left_alone() {
-    let folder = tempfile::tempdir().unwrap();
-    let stale = hidden::beside(&folder.path().join("out.wav"), std::process::id(), 0).unwrap();
-    fs::write(&stale, "not ours").unwrap();
-    let target = folder.path().join("out.wav");
-    AtomicFile::create(&target, false).unwrap().commit().unwrap();
-    drop(AtomicFile::create(&target, true).unwrap());
-    assert_eq!(fs::read(&stale).unwrap(), b"not ours");
-}
-
-#[test]
 fn a_name_as_long_as_the_system_allows_is_no_fault() {
     let folder = tempfile::tempdir().unwrap();
     let target = folder.path().join("x".repeat(250));
@@ -86,61 +87,10 @@ fn a_replaced_file_keeps_its_permissions_and_is_never_more_open() {
         fs::write(&target, "old").unwrap();
         fs::set_permissions(&target, fs::Permissions::from_mode(mode)).unwrap();
         let file = AtomicFile::create(&target, true).unwrap();
-        assert_eq!(file.beside.metadata().unwrap().permissions().mode() & 0o777, mode);
+        assert_eq!(file.hidden_name().metadata().unwrap().permissions().mode() & 0o777, mode);
         file.commit().unwrap();
         assert_eq!(target.metadata().unwrap().permissions().mode() & 0o777, mode);
     }
-}
-
-/// Only root can give files away.
-#[cfg(unix)]
-#[test]
-fn a_replaced_file_keeps_its_owner_if_root_replaces_it() {
-    use std::os::unix::fs::{MetadataExt, PermissionsExt, chown};
-    let folder = tempfile::tempdir().unwrap();
-    let target = folder.path().join("out.wav");
-    fs::write(&target, "old").unwrap();
-    if chown(&target, Some(12_345), Some(23_456)).is_err() {
-        return trials::skipped(&"the owner of replaced files: not root");
-    }
-    fs::set_permissions(&target, fs::Permissions::from_mode(0o4640)).unwrap();
-    let file = AtomicFile::create(&target, true).unwrap();
-    let access = |path: &Path| {
-        let known = path.metadata().unwrap();
-        (known.uid(), known.gid(), known.mode() & 0o7777)
-    };
-    assert_eq!(access(&file.beside), (12_345, 23_456, 0o4640));
-    file.commit().unwrap();
-    assert_eq!(access(&target), (12_345, 23_456, 0o4640));
-}
-
-/// Another program removes the unfinished file and puts a link, or a file, in its place.
-#[cfg(unix)]
-#[test]
-fn an_unfinished_file_that_another_program_replaced_gets_no_name() {
-    let folder = tempfile::tempdir().unwrap();
-    let (target, precious) = (folder.path().join("out.wav"), folder.path().join("precious"));
-    fs::write(&precious, "another's").unwrap();
-    for replace in [false, true] {
-        if replace {
-            fs::write(&target, "old").unwrap();
-        }
-        let mut file = AtomicFile::create(&target, replace).unwrap();
-        file.write_all(b"new").unwrap();
-        let hidden = file.beside.clone();
-        fs::remove_file(&hidden).unwrap();
-        std::os::unix::fs::symlink(&precious, &hidden).unwrap();
-        let error = file.commit().unwrap_err().to_string();
-        assert!(
-            error.contains("another program moved, removed or replaced") && error.contains(".part"),
-            "{error}"
-        );
-        assert_eq!(fs::read(&target).ok(), replace.then(|| b"old".to_vec()));
-        // What another program put there is not removed.
-        assert!(hidden.symlink_metadata().unwrap().is_symlink());
-        fs::remove_file(hidden).unwrap();
-    }
-    assert_eq!(fs::read(&precious).unwrap(), b"another's");
 }
 
 #[cfg(unix)]
@@ -160,27 +110,13 @@ fn links_are_followed_or_refused_but_never_replaced() {
     file.write_all(b"new").unwrap();
     file.commit().unwrap();
     assert_eq!(fs::read(path("sub/real")).unwrap(), b"new");
-    for (name, part) in [("dangling", "link to nothing"), ("circle", "back to itself")] {
-        let error = AtomicFile::create(&path(name), true).unwrap_err().to_string();
-        assert!(error.contains(part), "{error}");
-    }
+    let error = AtomicFile::create(&path("dangling"), true).unwrap_err().to_string();
+    assert!(error.contains("link to nothing"), "{error}");
+    assert!(AtomicFile::create(&path("circle"), true).is_err());
     for name in ["link", "second", "dangling", "circle"] {
         assert!(path(name).symlink_metadata().unwrap().is_symlink(), "{name}");
     }
     assert_eq!(names(&path("sub")), ["real"]);
-}
-
-#[cfg(target_os = "linux")]
-#[test]
-fn links_to_open_files_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
-    let open = File::create(folder.path().join("open")).unwrap();
-    let descriptor = format!("/proc/self/fd/{}", std::os::fd::AsRawFd::as_raw_fd(&open));
-    std::os::unix::fs::symlink(&descriptor, folder.path().join("link")).unwrap();
-    for path in [PathBuf::from(descriptor), folder.path().join("link")] {
-        let error = AtomicFile::create(&path, true).unwrap_err().to_string();
-        assert!(error.contains("open file") && error.contains("the name of a file"), "{error}");
-    }
 }
 
 #[cfg(unix)]
@@ -209,10 +145,10 @@ fn unfinished_files_can_be_removed_from_elsewhere() {
     // Not remove_unfinished itself: other tests of this process are writing.
     let folder = tempfile::tempdir().unwrap();
     let file = AtomicFile::create(&folder.path().join("out.wav"), false).unwrap();
-    assert!(unfinished(|files| files.contains_key(&file.beside)));
-    let beside = file.beside.clone();
+    let hidden = file.hidden_name().to_owned();
+    assert!(unfinished().contains(&hidden));
     file.commit().unwrap();
-    assert!(unfinished(|files| !files.contains_key(&beside)));
+    assert!(!unfinished().contains(&hidden));
 }
 
 fn file(folder: &Path, name: &str, replace: bool) -> AtomicFile {
@@ -253,15 +189,30 @@ fn none_appears_if_one_is_taken_meanwhile() {
     assert_eq!(content(folder.path()), pairs(&[("c", "another's")]));
 }
 
-#[cfg(target_os = "linux")]
+/// A folder is not replaced by a file.
 #[test]
-fn what_was_replaced_comes_back_if_one_is_refused() {
+fn what_has_its_name_already_is_named_if_another_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("a"), "old").unwrap();
     let files = ["a", "b"].map(|name| file(folder.path(), name, true));
-    // A folder is not replaced by a file.
     fs::create_dir(folder.path().join("b")).unwrap();
     fs::write(folder.path().join("b/inside"), "").unwrap();
-    assert!(commit_all(files.into()).is_err());
-    assert_eq!(content(folder.path()), pairs(&[("a", "old"), ("b", "folder")]));
+    let error = commit_all(files.into()).unwrap_err().to_string();
+    assert!(error.contains("/b: cannot give the finished file its name"), "{error}");
+    assert!(error.contains("already in place: ") && error.ends_with("/a"), "{error}");
+    assert_eq!(content(folder.path()), pairs(&[("a", "new"), ("b", "folder")]));
+}
+
+/// Unless it holds nothing.
+#[test]
+fn what_cannot_be_made_again_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut kept = file(folder.path(), "a", false);
+    kept.keep();
+    let hidden = kept.hidden_name().to_owned();
+    drop(kept);
+    assert_eq!(fs::read(&hidden).unwrap(), b"new");
+    let mut empty = AtomicFile::create(&folder.path().join("b"), false).unwrap();
+    empty.keep();
+    drop(empty);
+    assert_eq!(content(folder.path()).len(), 1);
 }

@@ -7,7 +7,6 @@ mod folded;
 mod netlist;
 mod output;
 mod parallel;
-mod shift_add;
 mod testbench;
 
 use super::bit_true::{BitTrue, IntegerFilters, WordSizes};
@@ -21,19 +20,8 @@ use parallel::parallel;
 use std::num::NonZeroU32;
 pub use testbench::MOST_RANDOM_FRAMES;
 
-/// How constants multiply.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
-#[non_exhaustive]
-pub enum Multipliers {
-    /// The operator *, for the multipliers of a device
-    Inferred,
-    /// Shifts and adders: canonical signed digits, common subexpressions of each input
-    ShiftAdd,
-}
-
 /// The circuit that is wanted. The default takes a frame at every clock, and has a register after every
-/// adder, inferred multipliers, an accumulator that never wraps, and outputs of the bits of the samples.
+/// adder, an accumulator that never wraps, and outputs of the bits of the samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct VerilogOptions {
     /// Bits of the samples; `None` for those of the spec's widest converter.
@@ -46,15 +34,13 @@ pub struct VerilogOptions {
     pub clocks_per_frame: NonZeroU32,
     /// Levels of adders between two registers.
     pub pipeline: NonZeroU32,
-    /// How constants multiply.
-    pub multipliers: Multipliers,
 }
 
 impl Default for VerilogOptions {
     fn default() -> Self {
-        let (one, multipliers) = (NonZeroU32::MIN, Multipliers::Inferred);
+        let one = NonZeroU32::MIN;
         let (input_bits, output_bits, accumulator_bits) = (None, None, None);
-        Self { input_bits, output_bits, accumulator_bits, clocks_per_frame: one, pipeline: one, multipliers }
+        Self { input_bits, output_bits, accumulator_bits, clocks_per_frame: one, pipeline: one }
     }
 }
 
@@ -119,8 +105,7 @@ impl Verilog {
         let mut netlist = Netlist::new(options.pipeline.get(), words.accumulator);
         let output = Output::new(words.output, integers.fraction_bits);
         let (clocks_per_frame, latency_clocks, rom_bits) = match options.clocks_per_frame.get() as usize {
-            1 => (1, parallel(&mut netlist, filters, words.input, options.multipliers, output), 0),
-            _ if options.multipliers == Multipliers::ShiftAdd => return Err(ExportError::ShiftAddRom),
+            1 => (1, parallel(&mut netlist, filters, words.input, output), 0),
             clocks => {
                 let schedule = Schedule::new(filters, clocks);
                 let (latency, rom) = folded(&mut netlist, filters, &schedule, words.input, output);
@@ -151,8 +136,7 @@ impl Verilog {
     /// that make the largest and the least sum of each phase, and `random` random ones.
     ///
     /// # Errors
-    /// [`ExportError::Frames`] for more random frames than [`MOST_RANDOM_FRAMES`], and
-    /// [`ExportError::Memory`].
+    /// [`ExportError::Frames`] for more random frames than [`MOST_RANDOM_FRAMES`].
     pub fn testbench(&self, random: u32) -> Result<Vec<(String, String)>, ExportError> {
         testbench::files(self, random)
     }

@@ -2,10 +2,8 @@
 //! its channel, the products of one phase and lag are added by a tree, and a chain of accumulators adds the
 //! lags.
 
-use super::Multipliers;
 use super::netlist::{Netlist, Term, Word, wrapped};
 use super::output::{Output, held_sum};
-use super::shift_add::multiples;
 use crate::interchange::bit_true::IntegerFilters;
 use crate::interchange::bit_true::Range;
 use std::collections::BTreeMap;
@@ -16,14 +14,12 @@ pub(super) fn parallel(
     netlist: &mut Netlist,
     filters: &IntegerFilters,
     input_bits: u32,
-    multipliers: Multipliers,
     output: Output,
 ) -> usize {
     let taps = &filters.taps;
     let inputs: Vec<Word> =
         (1..=taps.channels).map(|i| Word::at(0, format!("x{i}"), Range::of_bits(input_bits))).collect();
-    let products: Vec<_> =
-        inputs.iter().enumerate().map(|(i, x)| products(netlist, filters, i, x, multipliers)).collect();
+    let products: Vec<_> = inputs.iter().enumerate().map(|(i, x)| products(netlist, filters, i, x)).collect();
     let trees: Vec<Vec<Option<Term>>> = (0..taps.ratio)
         .map(|p| (0..taps.lags).map(|j| tree(netlist, filters, &products, p, j)).collect())
         .collect();
@@ -61,7 +57,6 @@ fn products(
     filters: &IntegerFilters,
     channel: usize,
     x: &Word,
-    multipliers: Multipliers,
 ) -> BTreeMap<u64, Term> {
     let taps = &filters.taps;
     let own = &taps.values[channel * taps.ratio * taps.lags..][..taps.ratio * taps.lags];
@@ -74,10 +69,7 @@ fn products(
         1 => (1, x.clone().into()),
         _ => (odd, netlist.product(x, odd.into(), shift).into()),
     };
-    match multipliers {
-        Multipliers::Inferred => parts.into_iter().map(product).collect(),
-        Multipliers::ShiftAdd => multiples(netlist, x, &parts.into_keys().collect()),
-    }
+    parts.into_iter().map(product).collect()
 }
 
 /// The sum of the products of one phase and lag.

@@ -3,14 +3,10 @@
 use super::Verilog;
 use crate::interchange::ExportError;
 use crate::interchange::layout::PolyphaseTaps;
-use crate::memory::check_memory;
 use std::fmt::Write;
 
 /// Random frames of a testbench, at most: simulators take minutes for as many.
 pub const MOST_RANDOM_FRAMES: u32 = 1_000_000;
-
-/// Bytes of a word of a frame: as a number, and as a text that grows.
-const WORD_BYTES: f64 = 40.0;
 
 /// Names and texts of the files.
 pub(super) fn files(verilog: &Verilog, random: u32) -> Result<Vec<(String, String)>, ExportError> {
@@ -19,7 +15,6 @@ pub(super) fn files(verilog: &Verilog, random: u32) -> Result<Vec<(String, Strin
     }
     let mut model = verilog.model.clone();
     let taps = model.filters.taps.clone();
-    check_memory(WORD_BYTES * f64::from(random) * (taps.channels + taps.ratio) as f64)?;
     let frames = frames(&taps, verilog.model.words.input, &model.resting(), random);
     let mut outputs = vec![0; taps.ratio];
     let (mut input, mut expected) = (String::new(), String::new());

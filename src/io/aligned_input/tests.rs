@@ -56,35 +56,6 @@ fn lost_frames_and_invalid_samples_come_out_as_nan_however_they_are_cut() {
 }
 
 #[test]
-fn frames_left_out_may_become_known_during_the_run() {
-    // Three frames are used, a break before frame 5 is reported in time and one before frame 6 late.
-    let mut live = input(1, &[], &[]);
-    let bytes: Vec<u8> = (0..9i16).flat_map(i16::to_be_bytes).collect();
-    let _ = live.refill(Block { filled: bytes.len(), bytes });
-    live.end();
-    let mut out = Vec::new();
-    let mut step = |live: &mut AlignedInput, frames: usize| {
-        live.prepare(frames);
-        let read = live.view(frames);
-        let sample = |b: &[u8]| Some(read.layout.format.decode(b) * 32768.0).filter(|x| x.is_finite());
-        out.extend(read.bytes.chunks_exact(read.layout.container).map(sample));
-        live.advance(frames);
-    };
-    step(&mut live, 3);
-    assert!(!live.leave_out(5, 2) && live.ready() == 2);
-    step(&mut live, 2);
-    assert_eq!(live.ready(), 2);
-    step(&mut live, 2);
-    step(&mut live, 2);
-    assert!(live.leave_out(6, 1) && live.ready() == 1);
-    step(&mut live, 1);
-    assert_eq!(live.ready(), 2);
-    step(&mut live, 2);
-    let want = [0, 1, 2, 3, 4, -1, -1, 5, 6, -1, 7, 8].map(|x| (x >= 0).then_some(f64::from(x)));
-    assert_eq!(out, want);
-}
-
-#[test]
 fn an_input_that_ends_early_leaves_later_timestamps_unreached() {
     let mut short = input(1, &[(9, 4)], &[]);
     assert_eq!(run(input(1, &[(3, 1)], &[]), 3, 2, 9), [Some(0), Some(1), Some(2), None]);
@@ -131,22 +102,6 @@ fn covered_is_what_some_dropout_contains() {
             time += step;
         }
     }
-}
-
-#[test]
-fn a_dropout_may_become_known_at_any_time_before_its_frames() {
-    let invalid = |channel, frames| Dropout { channel, frames };
-    let mut dropouts = Dropouts::new(vec![invalid(None, 50..51)], 2);
-    dropouts.advance(10);
-    assert!(!dropouts.add(invalid(Some(1), 12..14)) && !dropouts.any());
-    assert_eq!(dropouts.until_change(), 2);
-    // Of the frames 8 to 10 only the last is still ahead.
-    assert!(dropouts.add(invalid(Some(0), 8..11)));
-    assert!(dropouts.covers(0) && !dropouts.covers(1) && dropouts.until_change() == 1);
-    assert!(dropouts.add(invalid(Some(1), 3..5)) && !dropouts.covers(1));
-    dropouts.advance(1);
-    dropouts.advance(1);
-    assert!(dropouts.covers(1) && !dropouts.covers(0));
 }
 
 #[test]

@@ -27,8 +27,7 @@ fn reader(
     let input = Input::on_thread_of("dying".into(), header, 1, send_all).unwrap();
     let (stop, until) = (crossbeam_channel::never(), Until::Shortest);
     let inputs = vec![input];
-    let (stalls, live) = (None, None);
-    MultiReader { inputs, stop, until, stalls, live, max_lost: 0, origin: 0, ready: 0, consumed: 0 }
+    MultiReader { inputs, stop, until, stalls: None, max_lost: 0, origin: 0, ready: 0, consumed: 0 }
 }
 
 #[test]
@@ -64,8 +63,7 @@ fn time_interleaved_converters_are_the_channels_of_one_input() {
     std::fs::write(&path, (0u8..14).collect::<Vec<_>>()).unwrap();
     let interleaving = TimeInterleaving::by_delay(&[0.0, 2.0, 1.0]);
     let options = ReadOptions { interleaving: Some(&interleaving), ..raw(1) };
-    let started = MultiReader::start(&[path], options, crossbeam_channel::never()).unwrap();
-    let mut reader = started.unwrap();
+    let mut reader = MultiReader::start(&[path], options).unwrap();
     assert_eq!(reader.channels(), 3);
     let mut bytes: Vec<u8> = Vec::new();
     while let Arrival::Frames(frames) = reader.wait().unwrap() {
@@ -88,7 +86,7 @@ fn more_lost_samples_than_allowed_are_refused_with_the_bound() {
     let lost = LostSamples::parse(lines, "lost").unwrap();
     let start = |max_lost| {
         let options = ReadOptions { lost: Some(&lost), max_lost, ..raw(1) };
-        MultiReader::start(std::slice::from_ref(&path), options, crossbeam_channel::never())
+        MultiReader::start(std::slice::from_ref(&path), options)
     };
     assert!(start(80).is_ok());
     let error = start(79).err().unwrap().to_string();

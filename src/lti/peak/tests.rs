@@ -121,3 +121,28 @@ fn refinement_reaches_the_peak_whatever_the_first_points() {
         assert!(evaluations.get() <= 20, "{seed}: {} evaluations", evaluations.get());
     }
 }
+
+/// A peak that is 1e6 times as high as the gain beside it, and the same with other units of input and
+/// output: the accuracy is that of the closed form, and the digits are the same.
+#[test]
+fn accuracy_is_relative_to_the_peak_whatever_the_units() {
+    let (r, w0) = (1.0 - 1e-6, 0.7654_f64);
+    let a = Mat::from_row_slice(2, 2, &[2.0 * r * w0.cos(), -r * r, 1.0, 0.0]);
+    // |1/((1 - p/z)(1 - p*/z))|^2 is largest where cos w = (1 + r^2) cos w0 / (2 r), and there
+    // 1 / ((1 - r^2) sin w0).
+    let exact = 1.0 / ((1.0 - r * r) * w0.sin());
+    let mut gains = Vec::new();
+    for (input, output) in [(1.0, 1.0), (1e-9, 1.0), (1e9, 1e-9), (1e9, 1e9), (1e-9, 1e-9)] {
+        let system = siso(
+            a.clone(),
+            vec![input, 0.0],
+            vec![2.0 * r * w0.cos() * output, -r * r * output],
+            input * output,
+        );
+        gains.push(hinf_norm(&system).unwrap().gain / (input * output));
+    }
+    for gain in &gains {
+        assert!((gain / exact - 1.0).abs() < PEAK_ACCURACY, "{gain} {exact}");
+        assert!((gain / gains[0] - 1.0).abs() < 10.0 * FLAT_GAIN, "{gains:?}");
+    }
+}

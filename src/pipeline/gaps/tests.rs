@@ -133,7 +133,7 @@ fn stored_samples_pass_untouched_or_as_the_same_numbers() {
             let (mut got, mut got_mask, mut untouched) = (Vec::new(), Vec::new(), 0);
             for (piece, numbers) in bytes.chunks(block * 16).zip(samples.chunks(block * 2)) {
                 let recordings = &[PcmFrames { layout, channels: 2, bytes: piece }][..];
-                let is_filled = gaps.fill(&[Frames::new(recordings, 0..block)]);
+                let is_filled = gaps.fill(&[Frames::new(&recordings, 0..block)]);
                 untouched += usize::from(!is_filled);
                 got.extend_from_slice(if is_filled { gaps.filled(0) } else { numbers });
                 got_mask.extend_from_slice(gaps.marks(0..numbers.len() / 2 * 3));

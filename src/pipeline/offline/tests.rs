@@ -63,8 +63,8 @@ fn a_whole_signal_has_the_bits_of_the_command() {
         (3, 31, 4, Algorithm::Direct),
         (4, 6, 0, Algorithm::Direct),
         (1, 3, 70_001, Algorithm::Direct),
-        (2, 9, 3000, Algorithm::OverlapSave { transform: None }),
-        (2, 9, 30, Algorithm::OverlapSave { transform: None }),
+        (2, 9, 3000, Algorithm::OverlapSave),
+        (2, 9, 30, Algorithm::OverlapSave),
     ] {
         let bank = bank(24, ratio, latency);
         let plan = bank.plan(Options { algorithm, ..Options::default() }).unwrap();
@@ -85,8 +85,8 @@ fn a_whole_signal_has_the_bits_of_the_command() {
             let mut bytes = vec![0; frames * ratio * format.bytes()];
             let mut output = PcmOutput::packed(format, &mut bytes);
             let settings = Settings { workers: Some(&pool), ..settings };
-            let input = [Planar::new(&planes).unwrap()];
-            let whole = fuse(&bank, &plan, &input, &mut output, settings, NEVER).unwrap();
+            let input = Planar::new(&planes).unwrap();
+            let whole = fuse(&bank, &plan, &[&input], &mut output, settings, NEVER).unwrap();
             let case = format!("M = {ratio}, m0 = {latency}, {frames} frames, {algorithm:?}, {format}");
             assert_eq!(output.clipped, outcome.clipped, "{case}");
             assert!(bytes == want.samples, "{case}");
@@ -111,7 +111,7 @@ fn complex_samples_with_gaps_have_the_bits_and_gaps_of_the_command() {
     let settings = Settings { gaps: Some(GapPolicy::Hold), ..Settings::default() };
     let (want, outcome) = command(&bank, &plan, &[recording], settings, (PcmFormat::F32Le, true));
     let (real, imaginary) = ([recording.part(0)], [recording.part(1)]);
-    let parts = [&real, &imaginary].map(|part| Frames::new(&part[..], 0..frames));
+    let parts: [&dyn Input; 2] = [&real.as_slice(), &imaginary.as_slice()];
     let mut bytes = vec![0; want.samples.len()];
     let mut output = PcmOutput::packed(PcmFormat::F32Le, &mut bytes);
     let whole = fuse(&bank, &plan, &parts, &mut output, settings, NEVER).unwrap();
@@ -128,7 +128,7 @@ fn an_output_that_is_too_short_and_channels_that_do_not_match_are_refused() {
     let bank = bank(8, 2, 3);
     let plan = bank.plan(Options::default()).unwrap();
     let input = Interleaved::new(&[0.0f32; 8], 2).unwrap();
-    let short = fuse(&bank, &plan, &[input], &mut [0.0f32; 7][..], Settings::default(), NEVER);
+    let short = fuse(&bank, &plan, &[&input], &mut [0.0f32; 7].as_mut_slice(), Settings::default(), NEVER);
     assert!(matches!(
         short,
         Err(PipelineError::Process(ProcessError::OutputTooShort { given: 7, wanted: 8 }))
@@ -136,7 +136,7 @@ fn an_output_that_is_too_short_and_channels_that_do_not_match_are_refused() {
     let mono = Interleaved::new(&[0.0f32; 8], 1).unwrap();
     for gaps in [None, Some(GapPolicy::Zero)] {
         let settings = Settings { gaps, ..Settings::default() };
-        let refused = fuse(&bank, &plan, &[mono], &mut [0.0f32; 16][..], settings, NEVER);
+        let refused = fuse(&bank, &plan, &[&mono], &mut [0.0f32; 16].as_mut_slice(), settings, NEVER);
         assert!(matches!(
             refused,
             Err(PipelineError::Process(ProcessError::Channels { given: 1, wanted: 2 }))
@@ -150,16 +150,16 @@ fn segments_change_no_bit_and_a_fusion_ends_between_them() {
     let (bank, both) = (bank(2001, 2, 7), channels(140_001, false));
     let planes = both.each_ref().map(Vec::as_slice);
     let input = Planar::new(&planes).unwrap();
-    for algorithm in [Algorithm::Direct, Algorithm::OverlapSave { transform: None }] {
+    for algorithm in [Algorithm::Direct, Algorithm::OverlapSave] {
         let plan = bank.plan(Options { algorithm, ..Options::default() }).unwrap();
         let mut at_once = vec![0.0f32; both[0].len() * 2];
-        Stream::new(&plan).run(&input, &mut at_once[..]).unwrap();
+        Stream::new(&plan).run(&input, &mut at_once.as_mut_slice()).unwrap();
         let asked = Cell::new(0);
         let run = |most: usize| {
             let (mut output, stop) = (vec![0.0f32; at_once.len()], || asked.replace(asked.get() + 1) == most);
             asked.set(0);
             let settings = Settings { dropped: DroppedLatency::Added, ..Settings::default() };
-            fuse(&bank, &plan, &[input], &mut output[..], settings, &stop).map(|_| output)
+            fuse(&bank, &plan, &[&input], &mut output.as_mut_slice(), settings, &stop).map(|_| output)
         };
         let segments = run(usize::MAX).unwrap();
         let delay = plan.extra_latency();
@@ -184,7 +184,7 @@ fn more_frames_than_can_be_counted_are_refused() {
     let plan = bank.plan(Options::default()).unwrap();
     // Twice as many samples are 0 modulo the size of a word.
     let endless = Zeros { channels: 2, frames: usize::MAX / 2 + 1 };
-    let fused = fuse(&bank, &plan, &[endless], &mut [0.0; 4][..], Settings::default(), NEVER);
+    let fused = fuse(&bank, &plan, &[&endless], &mut [0.0; 4].as_mut_slice(), Settings::default(), NEVER);
     let wanted = ProcessError::TooManyFrames { frames: endless.frames, ratio: 2 };
     assert!(matches!(fused, Err(PipelineError::Process(error)) if error == wanted));
 }

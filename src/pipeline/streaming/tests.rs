@@ -39,7 +39,7 @@ fn only_samples_of_the_output_are_counted_as_clipped() {
         (5, 2, 40, Algorithm::Direct),
         (4, 37, 60, Algorithm::Direct),
         (8, 9, 1, Algorithm::Direct),
-        (2, 5, 700, Algorithm::OverlapSave { transform: None }),
+        (2, 5, 700, Algorithm::OverlapSave),
     ] {
         let taps = vec![noise(4 * m).iter().map(|&x| f64::from(x)).collect(), vec![0.7; 2 * m]];
         let bank = Bank {

@@ -77,17 +77,6 @@ pub enum Direction {
     Down,
 }
 
-/// Bytes that a fit holds.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Memory {
-    /// The equations, from the first sample on.
-    pub equations: f64,
-    /// The same while they are solved.
-    pub solving: f64,
-    /// The same if multigrid takes over, for large holes.
-    pub with_multigrid: f64,
-}
-
 /// Accumulates samples into the normal equations of one image and solves them.
 ///
 /// ORDER = degree + 1, 2 (bilinear) or 4 (bicubic); C values per sample.
@@ -108,20 +97,6 @@ impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
         let grid = Grid::of_image::<ORDER>(width, height);
         let (matrix, rhs) = (Stencil::new(grid, offsets::<ORDER>()), Planes::zeros(grid, C));
         Self { size: (width, height), matrix, rhs }
-    }
-
-    /// What a fit of an image of `width` x `height` pixels will hold.
-    pub fn memory(width: usize, height: usize) -> Memory {
-        let grid = Grid::of_image::<ORDER>(width, height);
-        // The right-hand sides become the residual. The solution, the direction and its image are as many,
-        // and the inverse of the diagonal is one more. The matrix has a row of zeros.
-        let equations = grid.bytes(offsets::<ORDER>().len() + C) + grid.row_bytes();
-        let solving = equations + grid.bytes(3 * C + 1);
-        Memory {
-            equations,
-            solving,
-            with_multigrid: solving + multigrid::bytes::<C>(grid, rows::reach(ORDER)),
-        }
     }
 
     /// Width and height of the grid of coefficients. It has ORDER / 2 - 1 coefficients more than pixels on

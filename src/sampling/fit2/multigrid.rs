@@ -4,8 +4,8 @@
 //! Coarse unknowns stand for blocks of 2 x 2 (unsmoothed aggregation, Galerkin matrices). A block that moves
 //! as a whole is too stiff, so the coarse correction is multiplied by a factor (Braess 1995).
 
-use super::planes::{Grid, Planes, ROWS_AT_ONCE};
-use super::stencil::{Stencil, couplings_within};
+use super::planes::{Planes, ROWS_AT_ONCE};
+use super::stencil::Stencil;
 use rayon::prelude::*;
 
 /// Damping of the Jacobi steps. The eigenvalues of D^{-1} A stay below 8/3 (bending), so the steps contract.
@@ -34,16 +34,6 @@ impl<const C: usize> Level<C> {
         let zeros = || Planes::zeros(a.grid(), C);
         Self { rhs: zeros(), solution: zeros(), a }
     }
-}
-
-/// Bytes of the preconditioner of a matrix that couples neighbours within `reach`.
-pub(super) fn bytes<const C: usize>(finest: Grid, mut reach: usize) -> f64 {
-    let (mut grid, mut bytes) = (finest, finest.bytes(C));
-    while grid.len() > COARSEST {
-        (grid, reach) = (grid.halved(), reach.div_ceil(2));
-        bytes += grid.bytes(couplings_within(reach, grid).count() + 2 * C) + grid.row_bytes();
-    }
-    bytes
 }
 
 impl<const C: usize> Multigrid<C> {

@@ -32,16 +32,6 @@ impl Grid {
         Self { width: self.width.div_ceil(2), height: self.height.div_ceil(2) }
     }
 
-    /// Bytes of so many images.
-    pub(super) fn bytes(self, count: usize) -> f64 {
-        count as f64 * self.height as f64 * self.row_bytes()
-    }
-
-    /// Bytes of a row.
-    pub(super) fn row_bytes(self) -> f64 {
-        (size_of::<f32>() * self.stride()) as f64
-    }
-
     /// Numbers of a row in memory, with its zeros: whole blocks of [`LANES`].
     pub(super) fn stride(self) -> usize {
         (self.width + BORDER).next_multiple_of(LANES)

@@ -14,7 +14,7 @@ pub(super) fn half_square(reach: usize) -> impl Iterator<Item = Offset> {
 }
 
 /// The same as far as a grid has them: one of few rows has no neighbours farther down.
-pub(super) fn couplings_within(reach: usize, grid: Grid) -> impl Iterator<Item = Offset> {
+fn couplings_within(reach: usize, grid: Grid) -> impl Iterator<Item = Offset> {
     half_square(reach).filter(move |offset| offset.1 < grid.height)
 }
 

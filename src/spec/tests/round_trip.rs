@@ -101,7 +101,6 @@ prop_compose! {
                 bits: bits.clone().filter(|_| method.reads("bits")),
                 fraction_bits: fraction_bits.filter(|_| method.reads("bits") && bits.is_some()),
                 loss_db: by_loss.then_some(0.25),
-                digits: by_loss && ratio % 4 == 0,
                 order: order.filter(|_| is_reduced),
                 reduction_loss_db: loss.filter(|_| is_reduced && order.is_none()),
                 ..DesignSpec::new(method, None)

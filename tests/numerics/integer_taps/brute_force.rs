@@ -1,4 +1,4 @@
-//! The best integer taps of a small bank, by trying all of them at all scales.
+//! The best integer taps of a small bank, by trying all of them.
 //!
 //! The row of phase p of the error depends on the taps of that phase alone, and no row of a matrix has a
 //! larger norm than the matrix. So the integers of each phase are tried apart, and those whose row is
@@ -6,11 +6,12 @@
 
 use hybank::design::LiftedPlant;
 use hybank::linalg::{CMat, Complex};
+use std::ops::RangeInclusive;
 
 /// Intervals of the frequencies.
 const GRID: usize = 96;
-/// Fraction bits tried.
-const SCALES: std::ops::RangeInclusive<i32> = -17..=24;
+/// Fraction bits that matter.
+pub(super) const SCALES: RangeInclusive<i32> = -17..=24;
 /// A bank counts as better if it is by this fraction.
 const BETTER: f64 = 1e-3;
 
@@ -48,12 +49,12 @@ impl BruteForce {
         Self { omegas, responses, ratio: plant.ratio(), channels: plant.channels(), taps, bits }
     }
 
-    /// The taps of least gamma on the grid, if that is below `gamma`.
-    pub(super) fn better_than(&self, gamma: f64) -> Option<Vec<Vec<f64>>> {
+    /// The taps of least gamma on the grid with so many fraction bits, if that is below `gamma`.
+    pub(super) fn better_than(&self, gamma: f64, scales: RangeInclusive<i32>) -> Option<Vec<Vec<f64>>> {
         let phases: Vec<Phase<'_>> = (0..self.ratio).map(|phase| Phase::new(self, phase)).collect();
         let mut bar = gamma * (1.0 - BETTER);
         let mut best = None;
-        for scale in SCALES {
+        for scale in scales {
             let step = (-f64::from(scale)).exp2();
             let lists: Vec<Vec<Vec<f64>>> = phases.iter().map(|phase| phase.below(step, bar)).collect();
             if lists.iter().any(Vec::is_empty) {

@@ -28,15 +28,6 @@ const MODELS: [(&str, usize); 11] = [
 /// Bytes of one point of an image.
 const POINT: u64 = 24;
 
-/// Fewest bytes of a camera or an image.
-const RECORD: usize = 48;
-
-/// Records of a file, at most.
-pub(super) fn most_records(bytes: &[u8]) -> usize {
-    let stated = bytes.first_chunk().map_or(0, |count| u64::from_le_bytes(*count));
-    usize::try_from(stated).map_or(usize::MAX, |stated| stated).min(bytes.len() / RECORD)
-}
-
 /// The cameras by their ids.
 pub(super) fn cameras(bytes: &[u8]) -> Result<BTreeMap<u64, Inner>, Fault> {
     records(bytes, |rest| {

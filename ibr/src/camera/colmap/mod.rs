@@ -17,9 +17,6 @@ use std::path::Path;
 /// What to do if a file of a model cannot be opened.
 const FILES: &str = "a COLMAP model has cameras.txt and images.txt, or cameras.bin and images.bin";
 
-/// Bytes that a listed image takes, while it is read and later.
-const LISTED: f64 = 1500.0;
-
 /// Where COLMAP puts models in its folders.
 pub(crate) const PLACES: [&str; 6] =
     ["sparse/0", "sparse", "0", "dense/0/sparse", "dense/sparse", "colmap/sparse/0"];
@@ -37,10 +34,7 @@ pub fn read_model(folder: &Path) -> Result<CameraList, InputError> {
         return Err(no_model(folder));
     }
     if !folder.join("cameras.txt").exists() && folder.join("cameras.bin").exists() {
-        let load = |name: &str| {
-            let bytes = files::read_bytes(&folder.join(name), FILES)?;
-            files::refuse_without_memory(folder, LISTED * binary::most_records(&bytes) as f64).map(|()| bytes)
-        };
+        let load = |name: &str| files::read_bytes(&folder.join(name), FILES);
         let (cameras, images) = (load("cameras.bin")?, load("images.bin")?);
         return join(folder, "bin", ": record ", binary::cameras(&cameras), binary::images(&images));
     }

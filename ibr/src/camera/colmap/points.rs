@@ -23,9 +23,6 @@ pub(crate) struct ScenePoint {
 /// What to do if the file cannot be opened.
 const FILES: &str = "depth = \"points\" needs points3D.txt or points3D.bin beside the cameras of the model";
 
-/// Bytes of memory per byte of a binary file.
-const PARSED: f64 = 4.0;
-
 /// Reads the points of the model in `folder`: the text file if it is there, else the binary one.
 ///
 /// # Errors
@@ -37,7 +34,6 @@ pub(crate) fn read_points(folder: &Path) -> Result<Vec<ScenePoint>, InputError> 
     let (text, bytes) = (folder.join("points3D.txt"), folder.join("points3D.bin"));
     if !text.exists() && bytes.exists() {
         let file = files::read_bytes(&bytes, FILES)?;
-        files::refuse_without_memory(&bytes, PARSED * file.len() as f64)?;
         let fault = |(record, reason)| InputError::content(&bytes, format!(": record {record}"), reason);
         return binary_points(&file).map_err(fault);
     }

@@ -7,7 +7,6 @@ use crate::cli::failure::{Failure, failed, usage};
 use crate::cli::heat;
 use crate::cli::output::{self, Encoded, Outputs, Part, ends_with, is_film};
 use crate::depth::{DepthMap, FAR, Measure};
-use crate::files::refuse_pixels_without_memory;
 use crate::image::{Image, Levels, encode_with_alpha, pfm};
 use crate::interpolate::Cover;
 use crate::pipeline::Rendering;
@@ -50,8 +49,6 @@ impl RenderArguments {
     ) -> Result<(Vec<Encoded<'a>>, Option<f32>), Failure> {
         let (mut all, mut white) = (Vec::new(), None);
         for (part, path) in &outputs.parts {
-            // Numbers or a picture, and the file.
-            refuse_pixels_without_memory(path, rendering.image.size(), 20.0).map_err(failed)?;
             all.push(match part {
                 Part::View => self.view(rendering, path)?,
                 Part::Mask => output::encoded(&mask_image(rendering), path, Levels::Eight)?,

@@ -4,7 +4,6 @@ use super::Summary;
 use crate::cli::arguments::RenderArguments;
 use crate::cli::failure::{Failure, failed, usage};
 use crate::cli::output::{self, Outputs, Part};
-use crate::files::refuse_pixels_without_memory;
 use crate::image::{FrameRate, Image, Levels, y4m};
 use hybank::files::AtomicFile;
 use hybank::program::{is_dash, print_bytes};
@@ -80,15 +79,12 @@ impl Film {
         if is_dash(path) {
             return Ok(Self { file: None, fps, begun: false });
         }
-        #[cfg(unix)]
-        hybank::files::remove_unfinished_on_signals();
         let file = AtomicFile::create(path, arguments.force).map_err(failed)?;
         Ok(Self { file: Some(file), fps, begun: false })
     }
 
     pub(super) fn append(&mut self, image: &Image) -> Result<(), Failure> {
         let path = self.file.as_ref().map_or("standard output".into(), |file| file.name().to_string());
-        refuse_pixels_without_memory(Path::new(&path), image.size(), 6.0).map_err(failed)?;
         let mut bytes = Vec::new();
         if !self.begun {
             bytes = y4m::header(image.size(), image.channels(), self.fps);

@@ -213,11 +213,5 @@ pub(crate) fn fit_surface(values: &[f32], shape: &[f32], width: usize, settings:
     springs::solve(fit, size, shape, &|_| true, settings, &|_| ()).0
 }
 
-/// Bytes that [`fit_surface`] takes beside its values, with its result and a shape.
-pub(crate) fn surface_memory(width: usize, height: usize) -> f64 {
-    let memory = Fit2::<2, 1>::memory(width, height);
-    memory.equations.max(memory.solving) + 8.0 * width as f64 * height as f64
-}
-
 #[cfg(test)]
 mod tests;

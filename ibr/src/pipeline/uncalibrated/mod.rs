@@ -7,7 +7,6 @@ mod morph;
 mod reconstruction;
 mod surface;
 
-use super::memory::Extent;
 use super::{RenderError, RenderSettings, Rendering, Watch};
 use crate::image::Image;
 use crate::interpolate::HoleFill;
@@ -115,8 +114,6 @@ pub fn render(
         return Err(RenderError::Tracks { images: images.len(), columns });
     }
     settings.check()?;
-    let extent = Extent::new(size, images, None);
-    extent.check(extent.of_tracks())?;
     let numbers = match target {
         Target::Tracks(_) if images.len() > 2 => base_pair::order(tracks, columns, uncalibrated.seed),
         _ => (0..columns).collect(),

@@ -1,7 +1,7 @@
 //! Scenes of general cameras: 3 x 4 matrices, COLMAP models or transforms files, and depths.
 
 use super::left_out::LeftOut;
-use super::{Goal, Inputs, Loaded, Loader, each, pixels};
+use super::{Goal, Inputs, Loaded, Loader, each};
 use crate::camera::Camera;
 use crate::camera::ListedCamera;
 use crate::camera::resize::{Size, factors};
@@ -60,7 +60,7 @@ impl Loader<'_> {
             let camera = |size| Ok(self.camera_of(view, size)?.0);
             self.read(view, Measure::Depth, camera, |image, camera| self.of_points(view, image, camera))
         };
-        let read = each(views, one, |read| pixels(&read.image), self.watch)?;
+        let read = each(views, one, self.watch)?;
         let resized =
             views.iter().zip(&read).map(|(view, read)| Ok(self.camera_of(view, read.image.size())?.1));
         let resized = resized.collect::<Loaded<Vec<_>>>()?;

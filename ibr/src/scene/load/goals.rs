@@ -3,13 +3,9 @@
 use super::{Loaded, Loader};
 use crate::files::InputError;
 use crate::scene::{TargetSpec, ViewSpec};
-use hybank::memory::check_memory;
 
 /// Most virtual views of a scene.
 pub const MOST_FRAMES: usize = 9999;
-
-/// Bytes per pixel that every rendering takes.
-const LEAST_BYTES: f64 = 11.0;
 
 /// One `[virtual]` table.
 pub(super) struct Goal {
@@ -136,8 +132,6 @@ impl Loader<'_> {
                 "more than the limit of {most}; make it smaller, or allow so many with --max-pixels"
             )));
         }
-        // Before the views are read; the rendering knows what it takes.
-        let refuse = |shortage| refused(format!("they take more than {shortage}; make it smaller"));
-        check_memory(LEAST_BYTES * pixels as f64).map_err(refuse).map(|()| (w, h))
+        Ok((w, h))
     }
 }

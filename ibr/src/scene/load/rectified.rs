@@ -1,6 +1,6 @@
 //! Scenes of a rectified rig: positions and disparities.
 
-use super::{Goal, Inputs, Loaded, Loader, each, pixels};
+use super::{Goal, Inputs, Loaded, Loader, each};
 use crate::camera::middlebury::{Calibration, read_calibration};
 use crate::depth::Measure;
 use crate::scene::{Kind, SourceView, ViewSpec};
@@ -29,7 +29,7 @@ impl Loader<'_> {
             };
             self.read(view, Measure::Disparity, |_| Ok(position), |_, _| Err(no_points()))
         };
-        let sources = each(views, one, |source| pixels(&source.image), self.watch)?;
+        let sources = each(views, one, self.watch)?;
         let first = sources[0].image.size();
         for (view, source) in views.iter().zip(&sources) {
             source.image.same_size(&view.named(), first, &views[0].named())?;

@@ -1,6 +1,6 @@
 //! Scenes without cameras: images and tracks.
 
-use super::{Goal, Inputs, Loaded, Loader, each, pixels};
+use super::{Goal, Inputs, Loaded, Loader, each};
 use crate::pipeline::uncalibrated::Target;
 use crate::scene::{Kind, ViewSpec};
 use crate::uncalibrated::Point;
@@ -23,7 +23,7 @@ impl Loader<'_> {
             None => goals.iter().filter_map(|goal| goal.target.from_tracks).collect(),
         };
         let columns = self.columns(views, &virtual_columns, tracks.columns())?;
-        let images = each(views, |view| self.image(&view.image), pixels, self.watch)?;
+        let images = each(views, |view| self.image(&view.image), self.watch)?;
         let pick = |row: &Vec<Option<Point>>| columns.iter().map(|c| row[c - 1]).collect();
         let in_column =
             |column: usize| Target::Tracks(tracks.rows().iter().map(|row| row[column - 1]).collect());

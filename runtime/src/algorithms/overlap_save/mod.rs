@@ -2,18 +2,17 @@
 //!
 //! The F frames up to the end of a block of B = F - (K - 1) frames are transformed, multiplied by the M by N
 //! spectra of the filters, and transformed back; the last B of them are outputs of the sum (Oppenheim and
-//! Schafer, section 8.7). Channels lie in lanes, and so do S segments of the stream where a vector has room
-//! for them, see [`simd`](crate::simd). Two blocks are the two parts of a complex one, so that a *batch* of
-//! 2 S B frames is made at once.
+//! Schafer, section 8.7). Channels lie in lane groups, and so do S segments of the stream where there is room
+//! for them. Two blocks are the two parts of a complex one: as the filters are real, the product with their
+//! spectra gives y_a + i y_b. So a *batch* of 2 S B frames is made at once.
 //!
 //! Batches are counted from the beginning of the stream and not of a call, so that cuts do not change a bit.
-//! An output is there when its batch is complete: all are late by 2 S B - 1 frames. The error of an output
-//! is about eps log2 F times the norm of its filters times that of the inputs of its two blocks, and not
-//! only of those in the filter's history.
+//! Outputs are those of the batch before: all are late by 2 S B frames. The error of an output is about
+//! eps log2 F times the norm of its filters times that of the inputs of its two blocks, and not only of
+//! those in the filter's history.
 //!
-//! The worst case of a call: inputs are checked, and NaN and infinity replaced, before filtering. A batch
-//! whose transforms overflow is filtered once more with smaller numbers, so no frame is filtered more than
-//! twice.
+//! NaN and infinity are replaced before filtering, and no frame is filtered twice. Sums that overflow leave
+//! their batch.
 
 mod shape;
 #[cfg(test)]
@@ -21,29 +20,27 @@ mod tests;
 
 pub(crate) use shape::Shape;
 
-use super::filter::{Facts, Filter, check_finite, phase_taps};
+use super::filter::{Facts, Filter, check_finite};
 use crate::adapters::{Input, Output};
-use crate::aligned::Aligned;
-use crate::simd::{
-    OutputFrames, Segments, Spectra, Transform, TransformKernel, all_finite, group_lanes, replace_not_finite,
-    row_samples,
-};
+use crate::simd::{Lanes, Product, Row, group_lanes, multiply, replace_not_finite};
 use crate::state::{Count, Numbers};
 use crate::{BuildError, Isa, Sample};
-use std::ops::Range;
-
-/// Input that makes a transform overflow is made smaller by this, and its output larger. In between only
-/// digits below 2^40 times the smallest number are lost.
-const OVERFLOW_SCALE: f64 = (1u64 << 40) as f64;
+use rustfft::algorithm::Radix4;
+use rustfft::algorithm::butterflies::{Butterfly4, Butterfly8};
+use rustfft::num_complex::Complex;
+use rustfft::num_traits::Zero;
+use rustfft::{Fft, FftDirection, FftNum, Length};
+use std::fmt;
+use std::sync::Arc;
 
 /// Coefficients in the order of use.
 #[derive(Debug)]
 pub(crate) struct OverlapSave<T: Sample> {
-    pub(crate) shape: Shape,
-    transform: Transform<T>,
-    /// H(f) / F.
-    spectra: Aligned<T>,
-    kernel: TransformKernel<T>,
+    shape: Shape,
+    forward: Transform<T::Portable>,
+    inverse: Transform<T::Portable>,
+    /// H(f) / F for 0 <= f <= F / 2: for each frequency and each group of phases a row for each channel.
+    spectra: Vec<Row<T>>,
     isa: Isa,
 }
 
@@ -51,200 +48,63 @@ pub(crate) struct OverlapSave<T: Sample> {
 #[derive(Debug, Clone)]
 pub(crate) struct OverlapSaveState<T: Sample> {
     /// K - 1 frames of history, then the batch that is being filled.
-    samples: Aligned<T>,
+    samples: Vec<T>,
     /// Frames of the batch that are there.
     filled: usize,
     /// Outputs of the batch before.
-    output: Aligned<T>,
-    work: Work<T>,
-}
-
-/// What is known of the frames of a call.
-#[derive(Default)]
-struct Progress {
-    /// From here on, up to the next one, the caller's frames are finite.
-    clean: usize,
-    /// Up to here the state knows them.
-    known: usize,
-    /// Up to here outputs are in the output.
-    written: usize,
-    /// Samples that were not finite.
-    replaced: u64,
-}
-
-/// Rows of channels and rows of phases.
-#[derive(Debug, Clone)]
-struct Work<T: Sample> {
-    channels: Aligned<T>,
-    phases: Aligned<T>,
+    output: Vec<T>,
+    /// F rows of each lane group of channels, and of each lane group of phases.
+    channels: Vec<Row<T>>,
+    phases: Vec<Row<T>>,
+    /// F rows on their way.
+    rows: Vec<Row<T>>,
 }
 
 impl<T: Sample> OverlapSave<T> {
-    /// `taps[i]` = f_i at the fast rate, M = `ratio` >= 1, N >= 1 filters, in transforms of length
-    /// F = `len`, a power of two from 16 on that is longer than the filters' memory.
-    pub(crate) fn new(taps: &[Vec<f64>], ratio: usize, len: usize, isa: Isa) -> Result<Self, BuildError> {
+    /// `taps[i]` = f_i at the fast rate, filters that fit `shape`.
+    pub(crate) fn new(taps: &[Vec<f64>], shape: Shape, isa: Isa) -> Result<Self, BuildError> {
         check_finite::<T>(taps)?;
-        let history = phase_taps(taps, ratio) - 1;
-        let shape = Shape::new(taps.len(), ratio, history, len, group_lanes::<T>());
-        if !shape.spectra_fit() {
-            return Err(BuildError::Spectra { channels: taps.len(), ratio, len });
-        }
         Ok(Self {
             shape,
-            transform: Transform::new(len, T::from_f64),
-            spectra: spectra(taps, &shape, isa),
-            kernel: TransformKernel::new(isa),
+            forward: Transform::new(shape.len, FftDirection::Forward),
+            inverse: Transform::new(shape.len, FftDirection::Inverse),
+            spectra: spectra::<T>(taps, &shape),
             isa,
         })
     }
 
-    /// The next frames of the batch: where they lie in the caller's memory (as a whole batch), or into the
-    /// state.
-    fn take<'a>(
-        &self,
-        state: &mut OverlapSaveState<T>,
-        input: &'a (impl Input + ?Sized),
-        frames: Range<usize>,
-        progress: &mut Progress,
-    ) -> Option<&'a [T]> {
-        let outside =
-            input.in_memory::<T>().and_then(|samples| self.in_place(samples, progress.clean, &frames));
-        if outside.is_none() {
-            self.load_history(state, input, frames.start, progress);
-            let count = self.gather(state, input, frames.start, frames.len());
-            if count > 0 {
-                progress.replaced += count;
-                progress.clean = frames.end;
-            }
-            progress.known = frames.end;
+    /// The outputs of a complete batch, which becomes history.
+    fn batch(&self, state: &mut OverlapSaveState<T>) {
+        match self.shape.depth {
+            1 => self.filter::<1>(state),
+            2 => self.filter::<2>(state),
+            4 => self.filter::<4>(state),
+            _ => self.filter::<8>(state),
         }
-        outside
-    }
-
-    /// Makes the state's history that of frame `first` again, if the frames before stayed in the caller's
-    /// memory.
-    fn load_history(
-        &self,
-        state: &mut OverlapSaveState<T>,
-        input: &(impl Input + ?Sized),
-        first: usize,
-        progress: &Progress,
-    ) {
         let Shape { channels, history, .. } = self.shape;
-        if let (true, Some(samples)) = (progress.known < first, input.in_memory::<T>()) {
-            let recent = &samples[(first - history) * channels..first * channels];
-            state.samples[..recent.len()].copy_from_slice(recent);
-        }
+        let begin = self.shape.batch() * channels;
+        state.samples.copy_within(begin..begin + history * channels, 0);
+        state.filled = 0;
     }
 
-    /// Outputs of the batch before to the frames of a call of which `first` is the next one of the batch.
-    fn pass_on(
-        &self,
-        state: &OverlapSaveState<T>,
-        output: &mut (impl Output + ?Sized),
-        first: usize,
-        frames: Range<usize>,
-    ) {
-        let m = self.shape.ratio;
-        if !frames.is_empty() {
-            let place = state.filled + 1 + frames.start - first;
-            output.store(self.isa, frames.start * m, &state.output[place * m..][..frames.len() * m]);
-        }
-    }
-
-    /// Makes the batch, whose first output belongs to frame `frame` of the call, `left` frames before its
-    /// end. Returns the frame up to which outputs are in the output: all of them, if there is room.
-    fn complete(
-        &self,
-        state: &mut OverlapSaveState<T>,
-        outside: Option<&[T]>,
-        output: &mut (impl Output + ?Sized),
-        frame: usize,
-        left: usize,
-    ) -> usize {
-        let m = self.shape.ratio;
-        // Whole lanes are written: somewhat more than the batch, which is still to come.
-        let needed = self.shape.batch() + group_lanes::<T>();
-        if needed <= left
-            && let Some(slots) = output.slots(frame * m..(frame + needed) * m)
-        {
-            self.batch(state, outside, Some(slots));
-            return frame + self.shape.batch();
-        }
-        self.batch(state, outside, None);
-        output.store(self.isa, frame * m, &state.output[..m]);
-        frame + 1
-    }
-
-    /// The frames of a whole batch with their history as they lie in the caller's memory, if they are all
-    /// there and finite.
-    fn in_place<'a>(&self, samples: &'a [T], clean: usize, frames: &Range<usize>) -> Option<&'a [T]> {
-        let Shape { channels, history, .. } = self.shape;
-        let whole = frames.len() == self.shape.batch();
-        let from = frames.start.checked_sub(history).filter(|&from| whole && from >= clean)?;
-        let x = &samples[from * channels..];
-        let len = (history + frames.len()) * channels;
-        // Frames are read as whole groups.
-        let fits = len + group_lanes::<T>() <= x.len();
-        (fits && all_finite(self.isa, &x[history * channels..len + group_lanes::<T>()])).then_some(x)
-    }
-
-    /// The next frames of the batch; returns how many samples were not finite and are 0 now.
-    fn gather(
-        &self,
-        state: &mut OverlapSaveState<T>,
-        input: &(impl Input + ?Sized),
-        first: usize,
-        frames: usize,
-    ) -> u64 {
-        let n = self.shape.channels;
-        let room = &mut state.samples[(self.shape.history + state.filled) * n..][..frames * n];
-        input.load(self.isa, first, room);
-        replace_not_finite(self.isa, room).count
-    }
-
-    /// The outputs of a complete batch, whose frames are `outside` or in the state, to `slots` or the state.
-    fn batch(&self, state: &mut OverlapSaveState<T>, outside: Option<&[T]>, slots: Option<&mut [T]>) {
-        let OverlapSaveState { samples, output, work, filled } = state;
-        let Shape { channels, ratio, history, .. } = self.shape;
-        let batch = self.shape.batch();
-        let output = slots.unwrap_or(output);
-        self.filter(work, outside.unwrap_or(samples), output);
-        let wanted = &mut output[..batch * ratio];
-        if !all_finite(self.isa, wanted) {
-            if let Some(outside) = outside {
-                let len = samples.len();
-                samples.copy_from_slice(&outside[..len]);
-            }
-            scale(samples, 1.0 / OVERFLOW_SCALE);
-            self.filter(work, samples, output);
-            scale(&mut output[..batch * ratio], OVERFLOW_SCALE);
-            scale(samples, OVERFLOW_SCALE);
-        }
-        if outside.is_none() {
-            samples.copy_within(batch * channels..(batch + history) * channels, 0);
-        }
-        *filled = 0;
-    }
-
-    /// From frames to the outputs of a batch, and to a group of lanes after it.
-    fn filter(&self, work: &mut Work<T>, samples: &[T], output: &mut [T]) {
-        let Shape { channels, ratio, depth, len, .. } = self.shape;
-        let plane = len * row_samples::<T>();
+    fn filter<const D: usize>(&self, state: &mut OverlapSaveState<T>) {
+        let OverlapSaveState { samples, output, channels, phases, rows, .. } = state;
+        let Shape { channels: n, ratio, history, len, .. } = self.shape;
         let block = self.shape.block();
-        let hop = block * channels;
-        for (i, rows) in work.channels.chunks_exact_mut(plane).enumerate() {
-            let samples = &samples[i * depth..];
-            let segments = Segments { parts: [samples, &samples[hop..]], stride: channels, hop: 2 * hop };
-            self.kernel.forward(&self.transform, depth, segments, rows);
+        for (group, channels) in channels.chunks_exact_mut(len).enumerate() {
+            gather::<T, D>(&samples[group * D..], [n, block * n], rows);
+            self.forward.process(rows, channels);
         }
-        let spectra = Spectra { channels, rows: &self.spectra };
-        self.kernel.product(&self.transform, depth, spectra, &work.channels, &mut work.phases);
-        for rows in work.phases.chunks_exact_mut(plane) {
-            self.kernel.inverse(&self.transform, rows);
+        multiply::<T>(
+            self.isa,
+            D,
+            Product { channels: n, len, spectra: &self.spectra, input: channels, output: phases },
+        );
+        // The last group may hold more lanes than there are phases, over which the others write.
+        for (group, phases) in phases.chunks_exact_mut(len).enumerate().rev() {
+            self.inverse.process(phases, rows);
+            scatter::<T, D>(&rows[history..], &mut output[group * D..], [ratio, block * ratio]);
         }
-        let to = OutputFrames { samples: output, stride: ratio, count: block };
-        self.kernel.scatter(&self.transform, depth, &work.phases, to);
     }
 }
 
@@ -256,7 +116,7 @@ impl<T: Sample> Filter for OverlapSave<T> {
         Facts {
             name: "overlap-save",
             history: Some(shape.history),
-            delay: shape.delay(),
+            delay: shape.batch(),
             alignment: shape.batch(),
             transform: Some((shape.len, shape.block())),
             multiply_adds: Some(shape.multiply_adds()),
@@ -265,17 +125,15 @@ impl<T: Sample> Filter for OverlapSave<T> {
 
     fn state(&self) -> OverlapSaveState<T> {
         let shape = &self.shape;
-        let plane = shape.len * row_samples::<T>();
-        // Frames are read and written as whole groups.
-        let padding = group_lanes::<T>();
+        let rows = |groups: usize| vec![Row::<T>::zero(); groups * shape.len];
         OverlapSaveState {
-            samples: Aligned::new((shape.history + shape.batch()) * shape.channels + padding),
+            // The last frames are read and written as whole groups.
+            samples: vec![T::default(); (shape.history + shape.batch()) * shape.channels + shape.depth],
             filled: 0,
-            output: Aligned::new(shape.batch() * shape.ratio + padding),
-            work: Work {
-                channels: Aligned::new(shape.inputs() * plane),
-                phases: Aligned::new(shape.outputs() * plane),
-            },
+            output: vec![T::default(); shape.batch() * shape.ratio + shape.depth],
+            channels: rows(shape.inputs()),
+            phases: rows(shape.outputs()),
+            rows: rows(1),
         }
     }
 
@@ -285,91 +143,121 @@ impl<T: Sample> Filter for OverlapSave<T> {
         state.filled = 0;
     }
 
-    fn process(
-        &self,
-        state: &mut OverlapSaveState<T>,
-        input: &(impl Input + ?Sized),
-        output: &mut (impl Output + ?Sized),
-    ) -> u64 {
-        let mut progress = Progress::default();
-        let mut first = 0;
+    fn process(&self, state: &mut OverlapSaveState<T>, input: &dyn Input, output: &mut dyn Output) -> u64 {
+        let Shape { channels: n, ratio: m, history, .. } = self.shape;
+        let (mut replaced, mut first) = (0, 0);
         while first < input.frames() {
-            let end = first + (input.frames() - first).min(self.shape.batch() - state.filled);
-            let outside = self.take(state, input, first..end, &mut progress);
-            let complete = state.filled + end - first == self.shape.batch();
-            // The frame that completes a batch already takes an output of it; those before take outputs of
-            // the batch before.
-            let before = end - usize::from(complete);
-            self.pass_on(state, output, first, progress.written.max(first)..before);
-            state.filled += end - first;
-            if complete {
-                let left = input.frames() - before;
-                progress.written = self.complete(state, outside, output, before, left);
+            let frames = (input.frames() - first).min(self.shape.batch() - state.filled);
+            let room = &mut state.samples[(history + state.filled) * n..][..frames * n];
+            input.load(self.isa, first, room);
+            replaced += replace_not_finite(self.isa, room).count;
+            output.store(self.isa, first * m, &state.output[state.filled * m..][..frames * m]);
+            (state.filled, first) = (state.filled + frames, first + frames);
+            if state.filled == self.shape.batch() {
+                self.batch(state);
             }
-            first = end;
         }
-        self.load_history(state, input, first, &progress);
-        progress.replaced
+        replaced
     }
 
     /// The history and the frames of the batch, and the outputs of the batch before that are still to come.
     fn count(&self, filled: usize) -> Count {
         let shape = &self.shape;
         let inputs = (shape.history + filled) * shape.channels;
-        Count { inputs, sums: (shape.delay() - filled) * shape.ratio }
+        Count { inputs, sums: (shape.batch() - filled) * shape.ratio }
     }
 
     fn save(&self, state: &OverlapSaveState<T>, put: &mut dyn FnMut(f64)) {
         let Count { inputs, sums } = self.count(state.filled);
-        let waiting = &state.output[(state.filled + 1) * self.shape.ratio..][..sums];
-        state.samples[..inputs].iter().chain(waiting).for_each(|value| put(value.to_f64()));
+        let (inputs, waiting) =
+            (&state.samples[..inputs], &state.output[state.filled * self.shape.ratio..][..sums]);
+        inputs.iter().chain(waiting).for_each(|value| put(value.to_f64()));
     }
 
     fn resume(&self, state: &mut OverlapSaveState<T>, filled: usize, numbers: Numbers<'_>) {
-        let Count { inputs, sums } = self.count(filled);
         Self::reset(state);
         state.filled = filled;
-        let waiting = &mut state.output[(filled + 1) * self.shape.ratio..][..sums];
-        for (place, slot) in state.samples[..inputs].iter_mut().chain(waiting).enumerate() {
+        let Count { inputs, sums } = self.count(filled);
+        let inputs = &mut state.samples[..inputs];
+        let waiting = &mut state.output[filled * self.shape.ratio..][..sums];
+        for (place, slot) in inputs.iter_mut().chain(waiting).enumerate() {
             *slot = T::from_f64(numbers.get(place));
         }
     }
 }
 
-fn scale<T: Sample>(samples: &mut [T], factor: f64) {
-    samples.iter_mut().for_each(|x| *x = T::from_f64(x.to_f64() * factor));
+/// From D samples of each frame to rows: samples of neighbouring frames and blocks are so far apart.
+fn gather<T: Sample, const D: usize>(samples: &[T], [frame, block]: [usize; 2], rows: &mut [Row<T>]) {
+    for (t, row) in rows.iter_mut().enumerate() {
+        let parts = row.re.lanes_mut().chunks_exact_mut(D).zip(row.im.lanes_mut().chunks_exact_mut(D));
+        for (segment, (re, im)) in parts.enumerate() {
+            let at = t * frame + 2 * segment * block;
+            re.copy_from_slice(&samples[at..][..D]);
+            im.copy_from_slice(&samples[at + block..][..D]);
+        }
+    }
 }
 
-/// Phases that are transformed together: the lanes of a group of f64.
-const QUAD: usize = group_lanes::<f64>();
-
-/// The spectra of all filters over F, made in f64 by the same transform, in the order of use.
-fn spectra<T: Sample>(taps: &[Vec<f64>], shape: &Shape, isa: Isa) -> Aligned<T> {
-    let Shape { channels, ratio, history, len, depth, segments } = *shape;
-    let (row, group) = (row_samples::<T>(), group_lanes::<T>());
-    let transform = Transform::new(len, |x: f64| x);
-    let kernel = TransformKernel::<f64>::new(isa);
-    let mut spectra = Aligned::new((len / 2 + 1) * shape.outputs() * channels * row);
-    let (mut samples, zeros) = (vec![0.0; len * QUAD], vec![0.0; len * QUAD]);
-    let mut rows = vec![0.0; len * row_samples::<f64>()];
-    for (channel, quad) in (0..channels).flat_map(|i| (0..ratio).step_by(QUAD).map(move |p| (i, p))) {
-        let phases = quad..(quad + QUAD).min(ratio);
-        for (k, p) in (0..=history).flat_map(|k| phases.clone().map(move |p| (k, p))) {
-            let tap = taps[channel].get(p + k * ratio);
-            samples[k * QUAD + p - quad] = tap.map_or(0.0, |tap| tap / len as f64);
+/// From rows to D samples of each frame.
+fn scatter<T: Sample, const D: usize>(rows: &[Row<T>], samples: &mut [T], [frame, block]: [usize; 2]) {
+    for segment in 0..group_lanes::<T>() / D {
+        for (t, row) in rows.iter().enumerate() {
+            let at = t * frame + 2 * segment * block;
+            samples[at..][..D].copy_from_slice(&row.re.lanes()[segment * D..][..D]);
         }
-        let segment = Segments { parts: [&samples, &zeros], stride: QUAD, hop: 0 };
-        kernel.forward(&transform, QUAD, segment, &mut rows);
-        for (pair, from) in transform.half_rows().enumerate() {
-            let from = &rows[from * row_samples::<f64>()..];
-            for p in phases.clone() {
-                let place = ((pair * shape.outputs() + p / depth) * channels + channel) * row;
-                for lane in (0..segments).map(|s| s * depth + p % depth) {
-                    spectra[place + lane] = T::from_f64(from[p - quad]);
-                    spectra[place + group + lane] = T::from_f64(from[QUAD + p - quad]);
-                }
+        for (t, row) in rows.iter().enumerate() {
+            let at = t * frame + (2 * segment + 1) * block;
+            samples[at..][..D].copy_from_slice(&row.im.lanes()[segment * D..][..D]);
+        }
+    }
+}
+
+/// The spectra of all filters over F, made in f64, in the order of use.
+fn spectra<T: Sample>(taps: &[Vec<f64>], shape: &Shape) -> Vec<Row<T>> {
+    let Shape { channels, ratio, len, depth, segments, .. } = *shape;
+    let forward = Transform::new(len, FftDirection::Forward);
+    let mut spectra = vec![Row::<T>::zero(); (len / 2 + 1) * shape.outputs() * channels];
+    let (mut filter, mut spectrum) = (vec![Complex::zero(); len], vec![Complex::zero(); len]);
+    for (channel, phase) in (0..channels).flat_map(|i| (0..ratio).map(move |p| (i, p))) {
+        filter.fill(Complex::zero());
+        for (slot, tap) in filter.iter_mut().zip(taps[channel].iter().skip(phase).step_by(ratio)) {
+            slot.re = tap / len as f64;
+        }
+        forward.process(&mut filter, &mut spectrum);
+        for (frequency, value) in spectrum[..=len / 2].iter().enumerate() {
+            let row = &mut spectra[(frequency * shape.outputs() + phase / depth) * channels + channel];
+            for lane in (0..segments).map(|segment| segment * depth + phase % depth) {
+                row.re.lanes_mut()[lane] = T::from_f64(value.re);
+                row.im.lanes_mut()[lane] = T::from_f64(value.im);
             }
         }
     }
     spectra
+}
+
+/// A transform without the factor 1 / F.
+struct Transform<N: FftNum>(Radix4<N>);
+
+impl<N: FftNum> Transform<N> {
+    /// Of a length that is a power of two from 8 on. Longer butterflies would need more groups than there are
+    /// registers for.
+    fn new(len: usize, direction: FftDirection) -> Self {
+        let levels = len.ilog2();
+        Self(match levels % 2 {
+            0 => Radix4::new_with_base(levels / 2 - 1, Arc::new(Butterfly4::new(direction))),
+            _ => Radix4::new_with_base(levels / 2 - 1, Arc::new(Butterfly8::new(direction))),
+        })
+    }
+
+    /// F numbers, which are lost, to F others.
+    fn process(&self, from: &mut [Complex<N>], to: &mut [Complex<N>]) {
+        // Of powers of two, transforms out of place need no other memory.
+        self.0.process_outofplace_with_scratch(from, to, &mut []);
+    }
+}
+
+impl<N: FftNum> fmt::Debug for Transform<N> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Transform({})", self.0.len())
+    }
 }

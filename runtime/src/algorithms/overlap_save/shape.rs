@@ -1,28 +1,42 @@
-//! How the stream is cut into transforms, and what they cost.
+//! How the stream is cut into transforms.
 
-/// Samples of all spectra: more would take gigabytes.
-const MOST_SPECTRA: f64 = (1u64 << 28) as f64;
+/// The shortest transform: below it the calls of a batch take longer than its arithmetic.
+const SHORTEST: usize = 128;
+
+/// Frames of a transform for each lag of the filters, at least: of the frames of a transform a block gives
+/// outputs for three quarters at least, seven eighths at most.
+const FRAMES_PER_LAG: usize = 4;
+
+/// Lane groups of all spectra, at most: more would take gigabytes.
+const MOST_SPECTRA: usize = 1 << 24;
 
 /// How the stream is cut into transforms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Shape {
-    pub(crate) channels: usize,
-    pub(crate) ratio: usize,
+    /// N.
+    pub(super) channels: usize,
+    /// M.
+    pub(super) ratio: usize,
     /// K - 1: frames that the filters look back.
-    pub(crate) history: usize,
+    pub(super) history: usize,
     /// F.
-    pub(crate) len: usize,
-    /// D, lanes of a segment in a group.
+    pub(super) len: usize,
+    /// D, lanes of a segment.
     pub(super) depth: usize,
-    /// S, segments in a group.
+    /// S, segments side by side.
     pub(super) segments: usize,
 }
 
 impl Shape {
-    /// For vectors of `group` lanes; F > K - 1.
-    pub(crate) fn new(channels: usize, ratio: usize, history: usize, len: usize, group: usize) -> Self {
-        let depth = channels.max(ratio).next_power_of_two().min(group);
-        Self { channels, ratio, history, len, depth, segments: group / depth }
+    /// For N channels, M phases and K lags in groups of so many lanes; `None` if the spectra would take
+    /// gigabytes.
+    pub(crate) fn new(channels: usize, ratio: usize, lags: usize, lanes: usize) -> Option<Self> {
+        let len = lags.checked_mul(FRAMES_PER_LAG)?.checked_next_power_of_two()?.max(SHORTEST);
+        let depth = channels.max(ratio).checked_next_power_of_two()?.min(lanes);
+        let (history, segments) = (lags - 1, lanes / depth);
+        let shape = Self { channels, ratio, history, len, depth, segments };
+        let spectra = channels.checked_mul(shape.outputs())?.checked_mul(len / 2 + 1)?;
+        (spectra <= MOST_SPECTRA).then_some(shape)
     }
 
     /// B, frames of a block.
@@ -30,49 +44,27 @@ impl Shape {
         self.len - self.history
     }
 
-    /// Frames that are made at once.
+    /// Frames that are filtered at once: each segment is a complex block, whose parts are two real ones.
     pub(crate) fn batch(&self) -> usize {
         2 * self.segments * self.block()
     }
 
-    /// Frames by which outputs are late.
-    pub(crate) fn delay(&self) -> usize {
-        self.batch() - 1
-    }
-
-    /// Groups of lanes that hold the channels.
-    pub(crate) fn inputs(&self) -> usize {
+    /// Lane groups that hold the channels.
+    pub(super) fn inputs(&self) -> usize {
         self.channels.div_ceil(self.depth)
     }
 
-    /// Groups of lanes that hold the phases.
-    pub(crate) fn outputs(&self) -> usize {
+    /// Lane groups that hold the phases.
+    pub(super) fn outputs(&self) -> usize {
         self.ratio.div_ceil(self.depth)
     }
 
-    /// Operations on single lanes for each fast sample.
+    /// Multiply-adds for each output sample; products and sums of the transforms count as such.
     pub(crate) fn multiply_adds(&self) -> f64 {
-        // A level of radix 2 takes 3 multiply-adds and 2 additions for each complex lane of half of the
-        // rows, as one half of a pass of radix 4: 17 operations per row in two levels, 8.5 in one.
-        let transforms = (self.inputs() + self.outputs()) as f64 * 3.5 * f64::from(self.len.ilog2());
+        // A butterfly of radix 4 with its factors takes 34 operations: for four rows, of two levels.
+        let transforms = (self.inputs() + self.outputs()) as f64 * 4.25 * f64::from(self.len.ilog2());
         let products = (4 * self.channels * self.outputs()) as f64;
-        let lanes = (self.len * self.depth * self.segments) as f64 * (transforms + products);
-        lanes / (self.batch() * self.ratio) as f64
-    }
-
-    /// Numbers of the coefficients, with the factors of the transform, and of a state.
-    pub(crate) fn numbers(&self) -> (f64, f64) {
-        let [len, channels, ratio, batch] =
-            [self.len, self.channels, self.ratio, self.batch()].map(|x| x as f64);
-        let [inputs, outputs] = [self.inputs(), self.outputs()].map(|x| x as f64);
-        let row = (2 * self.depth * self.segments) as f64;
-        let samples = (self.history as f64 + batch) * channels + batch * ratio;
-        (0.5 * len * outputs * channels * row + 3.0 * len, (inputs + outputs) * len * row + samples)
-    }
-
-    /// False if the spectra would take gigabytes.
-    pub(crate) fn spectra_fit(&self) -> bool {
-        let rows = (self.len / 2 + 1) as f64 * (self.outputs() * self.channels) as f64;
-        rows * (2 * self.depth * self.segments) as f64 <= MOST_SPECTRA
+        (self.len * self.depth * self.segments) as f64 * (transforms + products)
+            / (self.batch() * self.ratio) as f64
     }
 }

@@ -164,12 +164,7 @@ impl Filter for Recursive {
         state.resets = 0;
     }
 
-    fn process(
-        &self,
-        state: &mut RecursiveState,
-        input: &(impl Input + ?Sized),
-        output: &mut (impl Output + ?Sized),
-    ) -> u64 {
+    fn process(&self, state: &mut RecursiveState, input: &dyn Input, output: &mut dyn Output) -> u64 {
         let (mut replaced, mut first) = (0, 0);
         while first < input.frames() {
             let frames = (input.frames() - first).min(BLOCK - state.phase_offset);

@@ -8,8 +8,8 @@ fn run(filter: &StateSpace, n: usize, m: usize, isa: Isa, input: &[f64], cut: us
     let plan = Recursive::new(filter, n, m, isa).unwrap();
     let mut state = plan.state();
     let mut out = vec![0.0; input.len() / n * m];
-    for (x, y) in input.chunks(cut * n).zip(out.chunks_mut(cut * m)) {
-        plan.process(&mut state, &Interleaved::new(x, n).unwrap(), y);
+    for (x, mut y) in input.chunks(cut * n).zip(out.chunks_mut(cut * m)) {
+        plan.process(&mut state, &Interleaved::new(x, n).unwrap(), &mut y);
     }
     (out, plan.is_parallel())
 }
@@ -119,7 +119,7 @@ fn a_state_that_fades_away_becomes_zero() {
     let mut input = vec![0.0; 1200];
     input[0] = 1.0;
     let mut out = vec![0f64; 1200];
-    plan.process(&mut state, &Interleaved::new(&input[..], 1).unwrap(), &mut out[..]);
+    plan.process(&mut state, &Interleaved::new(input.as_slice(), 1).unwrap(), &mut out.as_mut_slice());
     // 2^-900 is 1e-271, still there; 2^-960 is below the limit, and never denormal (2^-1022).
     assert!(out[900] > 0.0 && out[1100] == 0.0);
     assert!(out.iter().all(|y| *y == 0.0 || y.is_normal()));
