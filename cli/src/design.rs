@@ -205,7 +205,8 @@ impl Watch<'_> {
         *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = Some(stage);
     }
 
-    /// Runs `work` and follows it meanwhile. Without a thread for that, nothing is shown and nothing limited.
+    /// Runs `work` and follows it meanwhile. Without a thread for that, nothing is shown and nothing
+    /// limited.
     fn during<T>(&self, work: impl FnOnce() -> T) -> T {
         thread::scope(|scope| {
             let (done_sender, done): (Sender<()>, _) = bounded(0);

@@ -3,8 +3,8 @@
 use crossbeam_channel::{Receiver, bounded};
 use hybank::program::interrupts::ask_first;
 
-/// A channel that receives a message at the first interrupt. Once it is dropped an interrupt ends the process,
-/// as before.
+/// A channel that receives a message at the first interrupt. Once it is dropped an interrupt ends the
+/// process, as before.
 pub(super) fn interrupts() -> Receiver<()> {
     let (sender, receiver) = bounded(1);
     ask_first(move || sender.try_send(()).is_ok());

@@ -13,7 +13,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Least time between two looks at what happens often, so that a line of each kind counts what it leaves out.
+/// Least time between two looks at what happens often, so that a line of each kind counts what it leaves
+/// out.
 const INTERVAL: Duration = Duration::from_secs(1);
 /// Time after which an input that gives nothing is reported.
 const PATIENCE: Duration = Duration::from_secs(1);

@@ -37,8 +37,8 @@ pub const VERSION: usize = 1;
 /// N synthesis filters with the data to run them. `design` writes a bank, and the other commands read it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bank {
-    /// The spec it was designed for, with all defaults filled in. What it leaves to the designer is open here:
-    /// what was chosen is [`latency`](Self::latency), [`filters`](Self::filters) and
+    /// The spec it was designed for, with all defaults filled in. What it leaves to the designer is open
+    /// here: what was chosen is [`latency`](Self::latency), [`filters`](Self::filters) and
     /// [`fixed_point`](Self::fixed_point). `None` for a bank made elsewhere.
     pub spec: Option<Spec>,
     /// The fast period h.
@@ -104,8 +104,8 @@ impl Gamma {
     /// Relative error of a computed norm that is no small difference.
     pub const NORM_ACCURACY: f64 = 1e-9;
 
-    /// The bounds of a bank with the computed `norm`, whose absolute error is at most `error`. No lower bound
-    /// exceeds the upper bound.
+    /// The bounds of a bank with the computed `norm`, whose absolute error is at most `error`. No lower
+    /// bound exceeds the upper bound.
     pub fn computed(norm: f64, error: f64, lower: f64, noncausal: f64) -> Self {
         Self {
             norm: Some(norm),

@@ -50,8 +50,8 @@ impl Problem {
         Ok(problem)
     }
 
-    /// Power of the noise that each channel adds, with the noise, bits and jitter of the converters of `spec`
-    /// and the front ends of this problem.
+    /// Power of the noise that each channel adds, with the noise, bits and jitter of the converters of
+    /// `spec` and the front ends of this problem.
     pub(super) fn noise_powers(&self, spec: &Spec) -> Result<Vec<f64>, DesignError> {
         let scale = input_scale(spec, self.signal.as_ref(), &self.front_ends[self.target]);
         let jitter = self.jitter_powers(spec)?;

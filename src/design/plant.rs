@@ -252,8 +252,8 @@ impl LiftedPlant {
         Ok(self.accuracy(norm)? * norm + self.rounding(filters)?)
     }
 
-    /// The relative error of a computed norm, without that from rounding in the products of filters and front
-    /// ends.
+    /// The relative error of a computed norm, without that from rounding in the products of filters and
+    /// front ends.
     ///
     /// # Errors
     /// [`DesignError::Lti`] if the plant is not stable.

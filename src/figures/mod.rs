@@ -13,7 +13,8 @@
 //! in the band of the spec's `[signal]`; for the spectrum |W|^2 where that is a filter; without the table
 //! for white noise at all frequencies, as in the thesis. The front ends stand before the samples in any
 //! case. The parts are the error from the signal, the noise of the converters, and what delays, gains and
-//! offsets that are off add ([`Snr`]). All are integrals of amplitudes over frequency, so 200 dB are resolved.
+//! offsets that are off add ([`Snr`]). All are integrals of amplitudes over frequency, so 200 dB are
+//! resolved.
 //!
 //! # Simple ways
 //! One channel alone with its Wiener filter, plain interleaving, and the cubic spline through all samples,

@@ -30,8 +30,8 @@ const VANISHING: f64 = 1e-6;
 /// Y_k = (1 / M) sum_i F_i(e^{j (w + 2 pi k / M)}) g_i Phi_i(j w) e^{-j w D_i}
 /// ```
 ///
-/// is the amplitude at w + 2 pi k / M: the tone for k = 0, an image for k = 1 .. M - 1. Where delays or gains
-/// are uncertain, the figures are root mean squares over their errors.
+/// is the amplitude at w + 2 pi k / M: the tone for k = 0, an image for k = 1 .. M - 1. Where delays or
+/// gains are uncertain, the figures are root mean squares over their errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tone {
     /// w / (2 pi).

@@ -209,7 +209,8 @@ fn destination(path: &Path, replace: bool) -> Result<(PathBuf, Option<Metadata>)
     }
 }
 
-/// Opens a new file next to `target`, with the permissions of an ordinary one or of the one that it replaces.
+/// Opens a new file next to `target`, with the permissions of an ordinary one or of the one that it
+/// replaces.
 fn begin_beside(target: &Path, replaced: Option<&Metadata>) -> io::Result<(File, TempPath)> {
     let name = target.file_name().ok_or(ErrorKind::InvalidFilename)?.to_string_lossy();
     let prefix = format!(".{}.", name.chars().take(NAME_PART).collect::<String>());

@@ -7,13 +7,13 @@
 //! file appears. A file that appeared under the name in the meantime is not replaced unless replacing was
 //! asked for.
 //!
-//! Several files can not get their names in one step. [`commit_all`] brings all of them to the disk first and
-//! then gives the names one after the other. If one is refused, the error names those that are there already.
-//! A power failure or `kill -9` between two names leaves a part of the set, too.
+//! Several files can not get their names in one step. [`commit_all`] brings all of them to the disk first
+//! and then gives the names one after the other. If one is refused, the error names those that are there
+//! already. A power failure or `kill -9` between two names leaves a part of the set, too.
 //!
 //! A replaced file keeps its permission bits; other names of it (hard links) keep the old content, and its
-//! owner and extended attributes are not carried over. A symbolic link is followed: the file that it leads to
-//! is replaced, the link stays.
+//! owner and extended attributes are not carried over. A symbolic link is followed: the file that it leads
+//! to is replaced, the link stays.
 //!
 //! A run that is killed (`kill -9`) leaves its unfinished files: hidden ones whose names end in `.part`.
 //! Where a signal can be caught, a program calls [`remove_unfinished`].

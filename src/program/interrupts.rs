@@ -1,8 +1,9 @@
-//! Interrupts: Ctrl-C, SIGTERM and the other signals by which terminals, shells and supervisors end a process.
+//! Interrupts: Ctrl-C, SIGTERM and the other signals by which terminals, shells and supervisors end a
+//! process.
 //!
 //! A program is in one of two states. While it computes, an interrupt ends it, with code 128 + signal. While
-//! it reads what cannot be read again, or searches for something better than what it has, the first interrupt
-//! asks it to end in order, and the next one ends it. Unfinished files go in both cases.
+//! it reads what cannot be read again, or searches for something better than what it has, the first
+//! interrupt asks it to end in order, and the next one ends it. Unfinished files go in both cases.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -12,8 +13,8 @@ static REQUEST: Mutex<Option<Request>> = Mutex::new(None);
 /// Says whether somebody was there to be asked.
 type Request = Box<dyn FnOnce() -> bool + Send>;
 
-/// From now on the first interrupt asks the program to end in order by `ask`. It ends the process if nobody is
-/// there to be asked any more, and `ask` says so with false.
+/// From now on the first interrupt asks the program to end in order by `ask`. It ends the process if nobody
+/// is there to be asked any more, and `ask` says so with false.
 pub fn ask_first(ask: impl FnOnce() -> bool + Send + 'static) {
     *REQUEST.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(ask));
 }
@@ -57,8 +58,8 @@ fn each_interrupt() {
     }
 }
 
-/// Whether the process was started to go on without its terminal, as by `nohup`, with SIGHUP ignored; so it is
-/// taken where that is unknown.
+/// Whether the process was started to go on without its terminal, as by `nohup`, with SIGHUP ignored; so it
+/// is taken where that is unknown.
 #[cfg(unix)]
 fn outlives_terminal() -> bool {
     let ignored = || {

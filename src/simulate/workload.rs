@@ -56,8 +56,8 @@ impl Analog {
 /// instants of the converters jitter.
 ///
 /// # Errors
-/// [`WorkloadError`]: no sample or too many, or a chirp or a front end so fast that the quadrature would take
-/// too long.
+/// [`WorkloadError`]: no sample or too many, or a chirp or a front end so fast that the quadrature would
+/// take too long.
 pub fn frames(
     problem: &Problem,
     signal: &Analog,

@@ -143,7 +143,8 @@ impl Step {
 /// The frames of converters with these rates.
 ///
 /// # Errors
-/// [`SpecProblem::Range`] for a rate that is in no simple ratio to the fast rate, and for frames beyond [`limits::MAX_RATIO`] fast samples or [`limits::MAX_CHANNELS`] samples.
+/// [`SpecProblem::Range`] for a rate that is in no simple ratio to the fast rate, and for frames beyond
+/// [`limits::MAX_RATIO`] fast samples or [`limits::MAX_CHANNELS`] samples.
 fn layout(fast_period: Seconds, rates: &[Hertz]) -> Result<FrameLayout, SpecError> {
     let step = |(channel, &rate): (usize, &Hertz)| {
         let path = format!("channel[{channel}].rate");

@@ -11,8 +11,8 @@ pub const MAX_RATIO: usize = 1024;
 /// Largest number of channels N; see [`MAX_RATIO`].
 pub const MAX_CHANNELS: usize = 1024;
 
-/// Most fast samples and samples of the converters per frame, together: the time and the matrices of a design
-/// grow with their square.
+/// Most fast samples and samples of the converters per frame, together: the time and the matrices of a
+/// design grow with their square.
 pub(super) const MAX_FRAME: usize = 1024;
 
 /// The same for designs that couple all samples of a frame, which are all but mean-square taps: they keep

@@ -56,8 +56,8 @@ impl Spec {
         signal + distinct.into_iter().map(poles).sum::<usize>()
     }
 
-    /// One state for each whole slow period by which a sample, of a converter or of the output, is older than
-    /// the newest one.
+    /// One state for each whole slow period by which a sample, of a converter or of the output, is older
+    /// than the newest one.
     fn chain_states(&self, layout: &FrameLayout) -> f64 {
         let delays = layout.waited_delays(&self.delays()).into_iter().map(GridTime::in_fast_periods);
         let outputs = (0..self.ratio).filter_map(|p| Some(p as f64 - self.latency? as f64));

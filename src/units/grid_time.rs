@@ -5,9 +5,9 @@ use std::cmp::Ordering;
 
 /// A time t = (n + p / q) h + r with the fast period h, a whole n, a fraction p / q in [0, 1) and
 /// |r| <= h / 2: a delay, or the instant of a sample. All terms are exact for any two doubles t and h of a
-/// spec, because the remainder of a division of doubles is a double; the fraction is that of a converter that
-/// takes several samples in a frame. So times are compared without rounding, and the time between two of
-/// them is rounded relative to itself: instants 1e-12 fast periods apart are that far apart.
+/// spec, because the remainder of a division of doubles is a double; the fraction is that of a converter
+/// that takes several samples in a frame. So times are compared without rounding, and the time between two
+/// of them is rounded relative to itself: instants 1e-12 fast periods apart are that far apart.
 ///
 /// A spec in seconds writes n fast periods as the double nearest to n h, which need not be n times h:
 /// three periods of 0.1 s are 0.30000000000000004 s. Exactly this one double means n fast periods.

@@ -109,7 +109,8 @@ fn without_threads_the_work_is_done_or_refused_in_one_line() {
     }
 }
 
-/// The first signal asks for an end in order, which a blocked write holds up; a further one ends the process.
+/// The first signal asks for an end in order, which a blocked write holds up; a further one ends the
+/// process.
 fn end_by_signals(child: &mut Child) {
     let begin = Instant::now();
     while child.try_wait().unwrap().is_none() {

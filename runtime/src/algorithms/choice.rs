@@ -1,7 +1,7 @@
 //! Which algorithm FIR filters run by.
 //!
-//! The choice depends on the sizes of the bank only, not on the processor, its load or the length of calls: the
-//! algorithms round differently, and a bank gives the same bits everywhere.
+//! The choice depends on the sizes of the bank only, not on the processor, its load or the length of calls:
+//! the algorithms round differently, and a bank gives the same bits everywhere.
 
 use super::filter::phase_taps;
 use super::overlap_save::Shape;
@@ -85,8 +85,8 @@ pub(crate) enum ChosenAlgorithm {
     OverlapSave(Shape),
 }
 
-/// Transforms pay from so many lags K on, times N M / (N + M): sums take K N M multiply-adds per frame, transforms a
-/// time by N + M.
+/// Transforms pay from so many lags K on, times N M / (N + M): sums take K N M multiply-adds per frame,
+/// transforms a time by N + M.
 const LONG: usize = 32;
 
 impl Algorithm {
@@ -150,7 +150,8 @@ mod tests {
 
     #[test]
     fn long_filters_are_transformed_and_short_ones_are_not() {
-        // Measured: the direct algorithm wins at the first K, overlap-save at the second by a third at least.
+        // Measured: the direct algorithm wins at the first K, overlap-save at the second by a third at
+        // least.
         for (n, m, short, long) in
             [(1, 1, 16, 512), (2, 2, 8, 128), (4, 4, 4, 64), (8, 8, 4, 32), (16, 16, 2, 16)]
         {

@@ -9,7 +9,8 @@
 use crate::linalg::Mat;
 use crate::spec::WordLengths;
 
-/// Partial decisions kept: with 8 of them banks of `filters/` lose up to 2.5 dB more at 8 bits, with one 6 dB.
+/// Partial decisions kept: with 8 of them banks of `filters/` lose up to 2.5 dB more at 8 bits, with one 6
+/// dB.
 const LIST_LENGTH: usize = 32;
 
 /// Integers between two bounds, both included.

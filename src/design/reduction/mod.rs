@@ -1,13 +1,13 @@
 //! Order reduction: a bank of few states, by frequency-weighted balanced truncation.
 //!
 //! The error K = W - F H is affine in the bank F, so replacing F by F_r costs `||(F - F_r) H||`. The states
-//! are therefore balanced with the inputs that the plant gives them, and not with white noise: H is the input
-//! weight of Enns (*Model reduction with balanced realizations: an error bound and a frequency weighted
-//! generalization*, CDC 1984). Without an output weight every truncation is stable.
+//! are therefore balanced with the inputs that the plant gives them, and not with white noise: H is the
+//! input weight of Enns (*Model reduction with balanced realizations: an error bound and a frequency
+//! weighted generalization*, CDC 1984). Without an output weight every truncation is stable.
 //!
-//! For the recursion that is left, the output matrices C and D are optimised again, which is a convex problem
-//! (`plant_samples`). Better poles may exist: the gamma reported is that of the bank found, not the least of
-//! all banks of its order.
+//! For the recursion that is left, the output matrices C and D are optimised again, which is a convex
+//! problem (`plant_samples`). Better poles may exist: the gamma reported is that of the bank found, not the
+//! least of all banks of its order.
 
 mod order_search;
 mod plant_samples;

@@ -13,7 +13,8 @@ fn taps_are_chosen_for_an_snr() {
     assert!((21.0..22.4).contains(&reached), "{taps} taps, {reached} dB");
     let fewer = format!("{}", taps - 1);
     assert!(snr("fewer.json", &["--method", "h2", "--taps", &fewer]).1 < 21.0);
-    // The spec in the bank is the wish; the taps are there, and the report says that their number was chosen.
+    // The spec in the bank is the wish; the taps are there, and the report says that their number was
+    // chosen.
     let bank = desk.read_json("snr.json");
     let design = &bank["spec"]["design"];
     assert_eq!(

@@ -2,9 +2,9 @@
 //!
 //! The F frames up to the end of a block of B = F - (K - 1) frames are transformed, multiplied by the M by N
 //! spectra of the filters, and transformed back; the last B of them are outputs of the sum (Oppenheim and
-//! Schafer, section 8.7). Channels lie in lane groups, and so do S segments of the stream where there is room
-//! for them. Two blocks are the two parts of a complex one: as the filters are real, the product with their
-//! spectra gives y_a + i y_b. So a *batch* of 2 S B frames is made at once.
+//! Schafer, section 8.7). Channels lie in lane groups, and so do S segments of the stream where there is
+//! room for them. Two blocks are the two parts of a complex one: as the filters are real, the product with
+//! their spectra gives y_a + i y_b. So a *batch* of 2 S B frames is made at once.
 //!
 //! Batches are counted from the beginning of the stream and not of a call, so that cuts do not change a bit.
 //! Outputs are those of the batch before: all are late by 2 S B frames. The error of an output is about
@@ -239,8 +239,8 @@ fn spectra<T: Sample>(taps: &[Vec<f64>], shape: &Shape) -> Vec<Row<T>> {
 struct Transform<N: FftNum>(Radix4<N>);
 
 impl<N: FftNum> Transform<N> {
-    /// Of a length that is a power of two from 8 on. Longer butterflies would need more groups than there are
-    /// registers for.
+    /// Of a length that is a power of two from 8 on. Longer butterflies would need more groups than there
+    /// are registers for.
     fn new(len: usize, direction: FftDirection) -> Self {
         let levels = len.ilog2();
         Self(match levels % 2 {
