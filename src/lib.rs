@@ -1,77 +1,37 @@
-#![cfg_attr(feature = "design", doc = include_str!("../README.md"))]
-#![cfg_attr(not(feature = "design"), doc = "Runs hybrid multirate filter banks with fractional delays.")]
+#![doc = include_str!("../README.md")]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 
-#[cfg(feature = "files")]
-pub mod files;
-pub mod messages;
-#[cfg(feature = "files")]
-pub mod npy;
-#[cfg(feature = "program")]
-pub mod program;
-pub mod quantity;
-pub mod sampling;
-pub mod units;
-
-#[cfg(feature = "runtime")]
-pub mod bank;
-#[cfg(feature = "runtime")]
-pub mod interchange;
-#[cfg(feature = "runtime")]
-pub mod io;
-#[cfg(feature = "runtime")]
-pub mod pipeline;
-#[cfg(feature = "runtime")]
-pub mod spec;
+pub use hybank_core::{bank, files, io, messages, npy, pipeline, quantity, spec, units};
 
 /// The crate `hybank-runtime`: it compiles a bank into a plan, filters streams with it, and converts PCM
 /// samples.
-#[cfg(feature = "runtime")]
 pub use hybank_runtime as runtime;
 
 /// The crate `hybank-linalg`: matrix decompositions and Fourier transforms.
-#[cfg(feature = "design")]
 pub use hybank_linalg as linalg;
 
-#[cfg(feature = "design")]
-pub mod analog;
-#[cfg(feature = "design")]
-pub(crate) mod arithmetic;
-#[cfg(feature = "design")]
-pub mod calibrate;
-#[cfg(feature = "design")]
-pub mod captures;
-#[cfg(feature = "design")]
-pub mod design;
-#[cfg(feature = "design")]
-pub mod figures;
-#[cfg(feature = "design")]
-pub mod lmi;
-#[cfg(feature = "design")]
-pub mod lti;
-#[cfg(feature = "design")]
-pub mod measure;
-#[cfg(feature = "design")]
-pub mod simulate;
-#[cfg(feature = "design")]
-pub mod sine_fit;
-#[cfg(feature = "design")]
-pub mod track;
-#[cfg(feature = "design")]
-pub mod verify;
+/// The crate `hybank-sampling`: splines, and samples that are not uniform.
+pub use hybank_sampling as sampling;
 
+pub mod analog;
+pub(crate) mod arithmetic;
+pub mod calibrate;
+pub mod captures;
+pub mod design;
+pub mod figures;
+pub mod interchange;
+pub mod lmi;
+pub mod lti;
+pub mod measure;
+#[cfg(feature = "plot")]
+pub mod overview;
 #[cfg(feature = "plot")]
 pub mod plot;
-
-#[cfg(all(feature = "design", feature = "plot"))]
-pub mod overview;
-
-#[cfg(test)]
-#[path = "../tests/support/random.rs"]
-mod random;
+pub mod simulate;
+pub mod sine_fit;
+pub mod track;
+pub mod verify;
 
 #[cfg(test)]
-#[path = "../tests/support/trials.rs"]
-#[allow(dead_code, unreachable_pub)]
-mod trials;
+use trials::random;

@@ -1,8 +1,8 @@
 #!/bin/sh
-# Makes tests/fixtures/two.flac with Python and ffmpeg: 3,000 frames at 24 kHz, 1 kHz in the left channel and 1.7 kHz
+# Makes core/tests/fixtures/two.flac with Python and ffmpeg: 3,000 frames at 24 kHz, 1 kHz in the left channel and 1.7 kHz
 # in the right one, amplitude 16000 of 32768.
 set -e
-cd "$(dirname "$0")/../tests/fixtures"
+cd "$(dirname "$0")/../core/tests/fixtures"
 python3 - <<'PY'
 import math, struct, wave
 with wave.open("two.wav", "wb") as out:

@@ -8,7 +8,7 @@
 #![allow(unsafe_op_in_unsafe_fn, reason = "each function has the one contract above")]
 
 use crate::{FAILURE, INT16, count, kept, open, process_int16, tail};
-use hybank::runtime::{PcmOutput, Stream};
+use hybank_core::runtime::{PcmOutput, Stream};
 use std::ffi::{CStr, c_char, c_int};
 use std::slice;
 

@@ -3,10 +3,12 @@
 #[allow(unsafe_code, reason = "C passes pointers")]
 mod abi;
 
-use hybank::bank::Bank;
-use hybank::files::{SPEC_OR_BANK, read_text};
-use hybank::messages::shown;
-use hybank::runtime::{Algorithm, Options, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, Stream};
+use hybank_core::bank::Bank;
+use hybank_core::files::{SPEC_OR_BANK, read_text};
+use hybank_core::messages::shown;
+use hybank_core::runtime::{
+    Algorithm, Options, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, Stream,
+};
 use std::cell::RefCell;
 use std::ffi::CString;
 use std::path::Path;

@@ -3,8 +3,7 @@
 //!
 //! `cargo bench --bench fuse_time`; set TMPDIR to a folder in memory to leave the disk out.
 
-#[path = "../../tests/support/random.rs"]
-mod random;
+use trials::random;
 #[path = "../../benches/stopwatch/mod.rs"]
 mod stopwatch;
 

@@ -4,8 +4,7 @@
 //! `cargo bench --bench pipe_overhead`; set TMPDIR to a folder in memory to leave the disk out. Bank A: N =
 //! M = 2, 24 taps.
 
-#[path = "../../tests/support/random.rs"]
-mod random;
+use trials::random;
 
 use random::Random;
 use std::fs::File;

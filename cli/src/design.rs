@@ -9,6 +9,7 @@ use super::print::{
     say_understood, show, warn,
 };
 use super::written::{check_output, write_text};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use hybank::design::{self, Design, DesignError, Options, Stage, Stop, TIME_LIMIT};
 use hybank::messages::Quoted;
@@ -48,7 +49,7 @@ pub(super) struct Args {
     #[arg(short, long)]
     output: PathBuf,
     /// Design method, in place of that of the spec
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = methods())]
     method: Option<Method>,
     /// Taps per channel, in place of those of the spec
     #[arg(long)]
@@ -98,6 +99,27 @@ pub(super) struct Args {
     /// Print a report as one JSON object on standard output
     #[arg(long)]
     json: bool,
+}
+
+/// Reads `--method`.
+fn methods() -> impl TypedValueParser<Value = Method> {
+    let names = Method::ALL.map(|method| {
+        PossibleValue::new(method.name()).help(match method {
+            Method::Fir => "Finite impulse responses of given length, least gamma",
+            Method::Iir => "State-space filters, least gamma",
+            Method::H2 => {
+                "State-space filters, or finite impulse responses with `taps`, least mean-square error"
+            }
+            Method::Sinc => {
+                "Papoulis/Yen interpolation of recurrent nonuniform samples, truncated (for comparison)"
+            }
+            Method::Separation => {
+                "First a fractional-delay filter per channel, then a bank for integer delays (for comparison)"
+            }
+        })
+    });
+    let method = |name: String| Method::ALL.into_iter().find(|method| method.name() == name);
+    PossibleValuesParser::new(names).try_map(move |name| method(name).ok_or("no method"))
 }
 
 fn overrides(args: &Args) -> DesignOverrides {

@@ -40,8 +40,8 @@ mod virtual_signal;
 mod written;
 
 use clap::{Parser, Subcommand};
-use hybank::messages::arguments;
-use hybank::program::interrupts;
+use hybank_program::arguments;
+use hybank_program::interrupts;
 use print::{Failure, PROGRAM};
 use std::process::ExitCode;
 

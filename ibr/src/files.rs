@@ -1,8 +1,8 @@
 //! Reading input files: whole, up to a size limit since a device may never end, and what is wrong with
 //! files.
 
-use hybank::files::{self, Bound, FileError};
-use hybank::messages::Quoted;
+use hybank_core::files::{self, Bound, FileError};
+use hybank_core::messages::Quoted;
 use std::path::{Path, PathBuf};
 
 /// What to do about a path in a scene that cannot be opened.

@@ -21,8 +21,3 @@ pub mod scene;
 pub mod setting;
 pub mod synthetic;
 pub mod uncalibrated;
-
-#[cfg(test)]
-#[path = "../tests/support/trials.rs"]
-#[allow(dead_code, unreachable_pub)]
-mod trials;

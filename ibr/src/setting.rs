@@ -1,6 +1,6 @@
 //! Settings outside their range.
 
-use hybank::messages::Number;
+use hybank_core::messages::Number;
 
 /// A number outside its range.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]

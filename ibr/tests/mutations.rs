@@ -1,8 +1,7 @@
 //! Damaged input: every parser of ours gives a value or a message for thousands of seeded mutations, and
 //! never panics. `fuzz/` looks deeper with the same checks.
 
-#[path = "../../tests/support/random.rs"]
-mod random;
+use trials::random;
 
 use hybank_ibr::camera::CameraList;
 use hybank_ibr::camera::colmap::parse_model;

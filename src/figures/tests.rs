@@ -382,5 +382,5 @@ fn check_image(
 /// Within 0.5 dB; `HYBANK_TRIALS=30` tries thirty systems.
 #[test]
 fn predictions_agree_with_virtual_converters() {
-    crate::trials::trials(3).for_each(check_prediction);
+    trials::trials(3).for_each(check_prediction);
 }

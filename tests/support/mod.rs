@@ -2,10 +2,11 @@
 // Each test program uses a part of it.
 #![allow(dead_code)]
 
-pub(crate) mod random;
 pub(crate) mod specs;
 pub(crate) mod sweep;
 pub(crate) mod wav_file;
+
+pub(crate) use trials::random;
 
 use serde_json::Value;
 

@@ -161,7 +161,8 @@ fn measure_and_calibrate_take_the_same_kinds() {
 #[test]
 fn captures_of_matlab_are_fused() {
     let desk = Desk::new();
-    let seeds = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("tests/fixtures/mat");
+    let seeds =
+        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("core/tests/fixtures/mat");
     for name in ["compressed.mat", "several.mat", "complex.mat"] {
         std::fs::copy(seeds.join(name), desk.path(name)).unwrap();
     }
@@ -202,7 +203,7 @@ fn lossy_recordings_name_the_pipe() {
 fn flac_recordings_are_captures() {
     let desk = Desk::new();
     let fixture =
-        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("tests/fixtures/two.flac");
+        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("core/tests/fixtures/two.flac");
     let sample =
         |n: usize, f: f64| (16e3 * (std::f64::consts::TAU * f * n as f64 / 24e3).sin()).round() as f32;
     let input: Vec<f32> =

@@ -5,8 +5,7 @@
 pub(crate) mod blocked;
 mod desk;
 pub(crate) mod forgery;
-#[path = "../../../tests/support/random.rs"]
-pub(crate) mod random;
+pub(crate) use trials::random;
 pub(crate) mod schema;
 #[path = "../../../tests/support/specs.rs"]
 pub(crate) mod specs;

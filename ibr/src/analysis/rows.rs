@@ -12,8 +12,8 @@ use crate::occlusion::DepthTest;
 use crate::pipeline::rectified::{self, Job, Strip};
 use crate::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights};
 use crate::propagate::{Frame, RectifiedView, RigCamera};
-use hybank::sampling::SamplingError;
-use hybank::sampling::fit::Response;
+use hybank_sampling::SamplingError;
+use hybank_sampling::fit::Response;
 use rayon::prelude::*;
 
 /// Distance in pixels over which a colour of doubtful depth is wrong, for the variogram.

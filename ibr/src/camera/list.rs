@@ -3,7 +3,7 @@
 use super::names::{self, Found, NameError};
 use super::{Camera, Lens};
 use crate::files::InputError;
-use hybank::messages::Quoted;
+use hybank_core::messages::Quoted;
 use nalgebra::{Matrix3, Matrix3x4};
 use serde::Deserialize;
 use std::collections::BTreeMap;

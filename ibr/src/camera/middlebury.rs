@@ -2,7 +2,7 @@
 //! baseline and the difference of the principal points.
 
 use crate::files::{self, CHECK_THE_PATH, InputError};
-use hybank::messages::Quoted;
+use hybank_core::messages::Quoted;
 use std::collections::BTreeMap;
 use std::path::Path;
 

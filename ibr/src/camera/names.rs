@@ -1,6 +1,6 @@
 //! Which image of a list a path means: one rule for COLMAP models, transforms files and `--view`.
 
-use hybank::messages::Quoted;
+use hybank_core::messages::Quoted;
 use std::cmp::Reverse;
 
 /// Most names that a message lists.

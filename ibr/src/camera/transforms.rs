@@ -6,7 +6,7 @@
 
 use super::list::{CameraList, Frame, Inner};
 use crate::files::{self, CHECK_THE_PATH, InputError};
-use hybank::messages::{Quoted, of_json};
+use hybank_core::messages::{Quoted, of_json};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};

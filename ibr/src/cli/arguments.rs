@@ -5,7 +5,7 @@ use crate::interpolate::plane::PlaneSettings;
 use crate::interpolate::{Degree, HoleFill};
 use crate::pipeline::{Method, RenderSettings};
 use clap::{Args, Parser, Subcommand};
-use hybank::messages::Quoted;
+use hybank_core::messages::Quoted;
 use std::path::PathBuf;
 
 /// Renders new views from photographs with depth (image-based rendering).

@@ -9,7 +9,7 @@ use crate::analysis::{Cause, Predicted, Predictor, Totals, ViewError};
 use crate::image::{Image, Levels, quality};
 use crate::pipeline::{Agreement, RenderError, Watch};
 use crate::scene::{Kind, Scene, SourceView};
-use hybank::messages::Quoted;
+use hybank_core::messages::Quoted;
 use serde::Serialize;
 use std::path::Path;
 

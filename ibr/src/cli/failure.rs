@@ -1,7 +1,7 @@
 //! This program in its messages, and its failures.
 
-pub(super) use hybank::program::Failure;
-use hybank::program::Program;
+pub(super) use hybank_program::Failure;
+use hybank_program::Program;
 
 pub(super) const PROGRAM: Program = Program { name: "hybank-ibr", has_bar: true };
 

@@ -4,8 +4,8 @@ use super::arguments::InitArguments;
 use super::failure::{Failure, PROGRAM, failed};
 use super::output::{self, Encoded};
 use crate::scene;
-use hybank::messages::Quoted;
-use hybank::program::is_dash;
+use hybank_core::messages::Quoted;
+use hybank_program::is_dash;
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &InitArguments) -> Result<(), Failure> {

@@ -16,7 +16,7 @@ mod summary;
 
 use arguments::{Arguments, Command};
 use failure::{Failure, PROGRAM, usage};
-use hybank::program::interrupts;
+use hybank_program::interrupts;
 use std::process::ExitCode;
 
 /// More threads than cores would only use memory for stacks.
@@ -26,7 +26,7 @@ const MOST_THREADS: usize = 1024;
 /// usage error.
 pub fn run() -> ExitCode {
     interrupts::handle();
-    let arguments = match hybank::messages::arguments::<Arguments>() {
+    let arguments = match hybank_program::arguments::<Arguments>() {
         Ok(arguments) => arguments,
         Err(message) => return PROGRAM.show(&message),
     };

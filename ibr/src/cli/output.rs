@@ -4,15 +4,15 @@ use super::arguments::SceneArguments;
 use super::failure::{Failure, failed, usage};
 use super::source::Source;
 use crate::image::{self, Image, Levels};
-use hybank::files::{AtomicFile, FileError, check_output, commit_all};
-use hybank::messages::{Quoted, printable};
-use hybank::program::{is_dash, print, print_bytes, say};
+use hybank_core::files::{AtomicFile, FileError, check_output, commit_all};
+use hybank_core::messages::{Quoted, printable};
+use hybank_program::{is_dash, print, print_bytes, say};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Outputs are different files, and none of them is an input.
 pub(super) fn refuse_overlaps(outputs: &[&Path], inputs: &[&Path]) -> Result<(), Failure> {
-    hybank::files::refuse_overlaps(outputs, inputs).map_err(failed)
+    hybank_core::files::refuse_overlaps(outputs, inputs).map_err(failed)
 }
 
 /// Refuses a file that exists, or cannot be begun, before any work is done.

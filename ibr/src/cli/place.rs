@@ -9,7 +9,7 @@ use crate::image::{Image, quality};
 use crate::pipeline::{Agreement, RenderError};
 use crate::propagate::View;
 use crate::scene::{Kind, Scene, SourceView};
-use hybank::messages::{Quoted, counted};
+use hybank_core::messages::{Quoted, counted};
 use serde::Serialize;
 
 /// Error of a virtual view of which a set of views shows nothing: the range of intensities.

@@ -7,8 +7,8 @@ use crate::files;
 use crate::image::{Image, read_image};
 use crate::pipeline::{RenderSettings, Watch};
 use crate::scene::{self, Kind, LoadOptions, Scene, SceneSpec};
-use hybank::messages::Quoted;
-use hybank::program::is_dash;
+use hybank_core::messages::Quoted;
+use hybank_program::is_dash;
 use std::path::{Path, PathBuf};
 
 /// A scene file, read but not loaded.

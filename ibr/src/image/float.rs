@@ -5,7 +5,7 @@ use super::source::Source;
 use crate::files::InputError;
 use exr::meta::MetaData;
 use exr::prelude::{ReadChannels, ReadLayers, read};
-use hybank::npy::{self, NpyHeader};
+use hybank_core::npy::{self, NpyHeader};
 use std::io::Cursor;
 use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, Limits};

@@ -3,7 +3,7 @@
 //! The sign of the scale gives the byte order (negative: little endian); its magnitude is not applied.
 
 use super::Image;
-use hybank::messages::Quoted;
+use hybank_core::messages::Quoted;
 
 /// Reads a float map, values as stored.
 ///

@@ -1,7 +1,7 @@
 //! The content of a file before its format is known.
 
 use crate::files::InputError;
-use hybank::messages::Quoted;
+use hybank_core::messages::Quoted;
 use std::path::Path;
 
 /// A file whose format is not known yet.

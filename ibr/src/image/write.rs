@@ -3,7 +3,7 @@
 use super::dynamic::{Levels, picture};
 use super::{Image, pfm};
 use crate::files::InputError;
-use hybank::files::AtomicFile;
+use hybank_core::files::AtomicFile;
 use image::{DynamicImage, ImageFormat};
 use std::io::{Cursor, Write};
 use std::path::Path;
@@ -50,7 +50,7 @@ pub fn save(image: &Image, path: &Path) -> Result<(), InputError> {
 }
 
 /// Writes bytes to a file without giving it its name yet: several of them are committed together by
-/// [`commit_all`](hybank::files::commit_all).
+/// [`commit_all`](hybank_core::files::commit_all).
 ///
 /// # Errors
 /// [`InputError`], also if the file exists and `replace` is not set.

@@ -10,8 +10,8 @@ use super::holes::{GAP, reach};
 use super::{Cover, HoleFill, Settings};
 use crate::depth::{fill_empty_rows, for_holes};
 use crate::sample::Sample;
-use hybank::sampling::fit::Response;
-use hybank::sampling::{Fit, FitSample};
+use hybank_sampling::fit::Response;
+use hybank_sampling::{Fit, FitSample};
 
 /// Keeps the normal equations definite if lambda and tau are 0; negligible beside any other weight.
 const RIDGE: f64 = 1e-9;
@@ -53,7 +53,7 @@ impl<const C: usize> RowWork<C> {
         settings: &Settings,
         values: &mut [f32],
         mask: &mut [Cover],
-    ) -> Result<bool, hybank::sampling::SamplingError> {
+    ) -> Result<bool, hybank_sampling::SamplingError> {
         mask.fill(Cover::Disocclusion);
         let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return Ok(false) };
         self.fit.clear();

@@ -130,7 +130,7 @@ pub enum RenderError {
         /// The row.
         row: usize,
         /// The solver's error.
-        source: hybank::sampling::SamplingError,
+        source: hybank_sampling::SamplingError,
     },
     /// No sample lies in the virtual image.
     #[error(

@@ -10,7 +10,7 @@ use crate::files::InputError;
 use crate::image::{MOST_PIXELS, image_size, read_image, read_map};
 use crate::pipeline::Agreement;
 use crate::propagate::RectifiedView;
-use hybank::messages::Quoted;
+use hybank_core::messages::Quoted;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

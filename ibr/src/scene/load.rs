@@ -21,7 +21,7 @@ use crate::files::InputError;
 use crate::image::{Image, MOST_PIXELS, read_image};
 use crate::pipeline::Watch;
 use goals::Goal;
-use hybank::messages::{self, Number, Quoted, of_document};
+use hybank_core::messages::{self, Number, Quoted, of_document};
 use left_out::LeftOut;
 use models::Models;
 use rayon::prelude::*;

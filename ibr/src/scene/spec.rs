@@ -1,7 +1,7 @@
 //! A scene file as written.
 
 use crate::camera::colmap::model_files;
-use hybank::messages::Quoted;
+use hybank_core::messages::Quoted;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::ser::Serializer;

@@ -2,7 +2,7 @@
 
 use super::Point;
 use crate::files::{self, CHECK_THE_PATH, InputError};
-use hybank::messages::Quoted;
+use hybank_core::messages::Quoted;
 use std::path::Path;
 
 /// What a line has, for messages.

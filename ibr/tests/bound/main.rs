@@ -8,8 +8,7 @@ mod place;
 #[path = "../../examples/plan/planner/mod.rs"]
 #[allow(dead_code, unreachable_pub, unused_imports)]
 mod planner;
-#[path = "../../../tests/support/random.rs"]
-mod random;
+use trials::random;
 #[path = "../ray_traced/scene.rs"]
 #[allow(dead_code)]
 mod scene;

@@ -2,7 +2,7 @@
 //! message has at most a few kilobytes.
 
 use super::*;
-use hybank::messages::printable;
+use hybank_core::messages::printable;
 
 const HOSTILE: &str = "\u{1b}[2J\u{9b}31m\u{202e}\u{7}\r\nhybank-ibr: forged";
 const MOST: usize = 8 << 10;

@@ -136,7 +136,7 @@ fn offsets_are_relative_to_the_reference() {
 /// Speech, captured elsewhere in the frequency domain: 1.2 and 0.6 fast periods.
 #[test]
 fn speech_gives_its_delay_to_1e_5_fast_periods() {
-    let Some(folder) = crate::trials::data("captures/speech-2x") else { return };
+    let Some(folder) = trials::data("captures/speech-2x") else { return };
     let text = std::fs::read_to_string(folder.join("spec.toml")).unwrap();
     let records = ["ch1.wav", "ch2.wav"].map(|name| {
         let mut wav = hound::WavReader::open(folder.join(name)).unwrap();

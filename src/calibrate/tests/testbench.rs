@@ -139,7 +139,7 @@ pub(super) fn errors(truth: &Spec, found: &Calibration) -> Errors {
 
 /// Number of seeded trials: `few`, or HYBANK_TRIALS.
 pub(super) fn trials(few: u64) -> usize {
-    crate::trials::trials(few).count()
+    trials::trials(few).count()
 }
 
 /// Checks that 95 % intervals hold the truth in 93 to 97 % of the cases; wider for fewer trials.

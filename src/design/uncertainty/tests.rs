@@ -209,7 +209,7 @@ fn random_case(trial: u64) -> (Bank, ErrorBox) {
 /// `HYBANK_TRIALS=0..100` makes as many, in minutes.
 #[test]
 fn random_boxes_are_bounded() {
-    for trial in crate::trials::trials(3) {
+    for trial in trials::trials(3) {
         let (bank, errors) = random_case(trial);
         let found = check(&bank, &errors, 20, 6.0);
         println!("{trial}: {:.3e} of {:.3e}, {errors:?}", found.upper / found.attained, found.attained);

@@ -11,6 +11,8 @@
 //!
 //! A fifth, `HYBANK_PYTHON`, names the Python of `.ci/run`.
 
+pub mod random;
+
 use std::env;
 use std::fmt::Display;
 use std::fs::OpenOptions;

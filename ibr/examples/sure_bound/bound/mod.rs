@@ -4,7 +4,6 @@ mod row;
 
 pub use row::Limits;
 
-use hybank::sampling::fit::Response;
 use hybank_ibr::depth::Measure;
 use hybank_ibr::interpolate::Cover;
 use hybank_ibr::interpolate::rows::{MARGIN, RowWork};
@@ -12,6 +11,7 @@ use hybank_ibr::occlusion::{RowScratch, remove_in_row};
 use hybank_ibr::pipeline::{RenderError, RenderSettings, Rendering, ViewWeights, rectified};
 use hybank_ibr::propagate::{Frame, RectifiedView, RigCamera, rectified_row};
 use hybank_ibr::sample::Sample;
+use hybank_sampling::fit::Response;
 use row::{RANGE, REACH, Row};
 
 /// Order of the splines of the row fit.

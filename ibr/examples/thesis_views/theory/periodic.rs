@@ -27,7 +27,7 @@
 //! holds for them.
 
 use super::quadrature::{gauss_legendre, integral};
-use hybank::sampling::SamplingError;
+use hybank_sampling::SamplingError;
 use std::ops::Range;
 
 /// Panels of the integral over a varying density.

@@ -1,7 +1,7 @@
 //! Linear interpolation between samples with errors and jitter, and its bounds (thesis Prop. 3.1).
 
-use hybank::sampling::SamplingError;
-use hybank::sampling::nonuniform::{Measured, Smoothness};
+use hybank_sampling::SamplingError;
+use hybank_sampling::nonuniform::{Measured, Smoothness};
 
 /// Piecewise linear interpolation through measured samples, with its error bound (Prop. 3.1).
 #[derive(Debug, Clone, PartialEq)]

@@ -9,7 +9,7 @@ pub(crate) use points::{ScenePoint, read_points};
 
 use super::list::{CameraList, Frame, Inner};
 use crate::files::{self, CHECK_THE_PATH, InputError};
-use hybank::messages::{Number, Quoted};
+use hybank_core::messages::{Number, Quoted};
 use nalgebra::{Isometry3, Matrix3x4, Quaternion, UnitQuaternion};
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -11,8 +11,8 @@ use crate::image::{Image, Levels, encode_with_alpha, pfm};
 use crate::interpolate::Cover;
 use crate::pipeline::Rendering;
 use crate::scene::{Kind, Scene};
-use hybank::messages::Quoted;
-use hybank::program::is_dash;
+use hybank_core::messages::Quoted;
+use hybank_program::is_dash;
 use std::path::Path;
 
 impl RenderArguments {

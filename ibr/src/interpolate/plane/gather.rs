@@ -4,7 +4,7 @@ use super::{Fit2Sample, GUESSED, PlaneProblem};
 use crate::interpolate::holes::reach;
 use crate::occlusion::LARGEST_SPACING;
 use crate::sample::Sample;
-use hybank::sampling::fit2::Fit2Rows;
+use hybank_sampling::fit2::Fit2Rows;
 use rayon::prelude::*;
 use std::ops::Range;
 

@@ -1,6 +1,6 @@
 //! The coefficients of the splines beside the pixels of the image.
 
-use hybank::sampling::Fit2;
+use hybank_sampling::Fit2;
 
 /// Pixels and coefficients: a bicubic spline has one coefficient more than there are pixels on each side.
 #[derive(Debug, Clone, Copy)]

@@ -11,7 +11,7 @@
 //!
 //! over neighbours pq and triples pqr in a row or column, where (D_p - D_q) / k is the depth difference in
 //! units of the depth test's sigma. The coefficients of the bilinear spline are the pixels. Its bending term
-//! smooths like a cubic spline: it removes noise and keeps slopes. [`hybank::sampling::fit2`] holds and
+//! smooths like a cubic spline: it removes noise and keeps slopes. [`hybank_sampling::fit2`] holds and
 //! solves the equations.
 
 mod background;
@@ -23,8 +23,8 @@ use super::extend::{Level, mean};
 use super::{Cover, Degree, HoleFill, Settings, Watch};
 use crate::depth::{DepthMap, Measure, NONE};
 use grid::Grid;
-use hybank::sampling::Fit2;
-use hybank::sampling::fit2::Fit2Sample;
+use hybank_sampling::Fit2;
+use hybank_sampling::fit2::Fit2Sample;
 use rayon::prelude::*;
 
 /// Settings of the plane fit.
@@ -158,7 +158,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         plane.stiffness = plane.stiffness.max(plane.noise_stiffness);
         let (mut values, ended) =
             springs::solve(self.fit, (width, height), &depth, &fitted, &self.settings, watch);
-        let hybank::sampling::fit2::Convergence { steps, residual, reached } = ended;
+        let hybank_sampling::fit2::Convergence { steps, residual, reached } = ended;
         // The depths that were continued into holes are those of the springs only.
         let holes = depth.iter_mut().zip(&mask).filter(|(_, cover)| **cover != Cover::Seen);
         holes.for_each(|(depth, _)| *depth = f32::NAN);

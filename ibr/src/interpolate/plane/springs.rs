@@ -3,8 +3,8 @@
 use super::grid::Grid;
 use crate::interpolate::{Settings, Watch};
 use crate::occlusion::DepthTest;
-use hybank::sampling::Fit2;
-use hybank::sampling::fit2::{Convergence, Direction, Iteration, Springs};
+use hybank_sampling::Fit2;
+use hybank_sampling::fit2::{Convergence, Direction, Iteration, Springs};
 
 /// Fits the pixels that lie `inside`, with the springs of the surfaces that these depths show. Of the
 /// settings those of the springs and of the solver are used.

@@ -97,7 +97,7 @@ fn outcome(kind: Kind, seed: u64) -> Option<(OrderBy, bool)> {
 /// makes 300.
 #[test]
 fn few_orders_are_wrong_in_the_end() {
-    let seeds = crate::trials::trials(1);
+    let seeds = trials::trials(1);
     for kind in [Kind::SideBySide, Kind::Cropped, Kind::UnequalFocal] {
         let found: Vec<(OrderBy, bool)> = seeds.clone().filter_map(|seed| outcome(kind, seed)).collect();
         let count = |by: OrderBy, right: bool| found.iter().filter(|f| **f == (by, right)).count();

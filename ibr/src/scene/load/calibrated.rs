@@ -8,7 +8,7 @@ use crate::camera::resize::{Size, factors};
 use crate::depth::Measure;
 use crate::files::InputError;
 use crate::scene::{Kind, ViewSpec};
-use hybank::messages::Quoted;
+use hybank_core::messages::Quoted;
 use nalgebra::Matrix3x4;
 
 type Matrix = [[f64; 4]; 3];

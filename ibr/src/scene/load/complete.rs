@@ -6,7 +6,7 @@ use crate::camera::middlebury::read_calibration;
 use crate::camera::transforms::read_transforms;
 use crate::files::InputError;
 use crate::scene::{SceneSpec, ViewSpec};
-use hybank::messages::{Number, Quoted};
+use hybank_core::messages::{Number, Quoted};
 use std::path::Path;
 
 /// The scene with what its `transforms` or `calib` file adds: views if it lists none, and disparity offsets.

@@ -4,7 +4,7 @@ use super::{Loaded, Loader};
 use crate::camera::names::{self, NameError};
 use crate::files::InputError;
 use crate::scene::ViewSpec;
-use hybank::messages::Quoted;
+use hybank_core::messages::Quoted;
 
 /// What `--view` names.
 pub(super) enum LeftOut {

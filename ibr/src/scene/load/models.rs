@@ -8,7 +8,7 @@ use crate::camera::transforms::read_transforms;
 use crate::camera::{CameraList, ListedCamera};
 use crate::files::InputError;
 use crate::scene::ViewSpec;
-use hybank::messages::Quoted;
+use hybank_core::messages::Quoted;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -4,7 +4,7 @@ use super::{Goal, Inputs, Loaded, Loader, each};
 use crate::camera::middlebury::{Calibration, read_calibration};
 use crate::depth::Measure;
 use crate::scene::{Kind, SourceView, ViewSpec};
-use hybank::messages::Quoted;
+use hybank_core::messages::Quoted;
 
 impl Loader<'_> {
     pub(super) fn rectified(

@@ -99,7 +99,7 @@ fn few_orders_are_wrong() {
         (Kind::SlightlyCropped, 0.005),
         (Kind::Cropped, 0.01),
     ] {
-        let found: Vec<(f64, f64, f64)> = crate::trials::trials(12)
+        let found: Vec<(f64, f64, f64)> = trials::trials(12)
             .filter_map(|seed| pair(kind, seed))
             .filter_map(|(votes, truth)| mean_sign(&votes).map(|(mean, agreement)| (mean, agreement, truth)))
             .collect();

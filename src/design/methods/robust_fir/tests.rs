@@ -144,7 +144,7 @@ fn robust_designs_reach_their_bound_and_win_what_the_table_says() {
         "family = \"chebyshev1\", order = 5, cutoff = 0.3, ripple_db = 0.5",
         "family = \"elliptic\", order = 5, cutoff = 0.4, ripple_db = 0.5, attenuation_db = 50.0",
     ];
-    let rows = if crate::trials::is_slow("all rows of the table of what robust designs win") { 3 } else { 1 };
+    let rows = if trials::is_slow("all rows of the table of what robust designs win") { 3 } else { 1 };
     for filter in &filters[..rows] {
         for (ratio, channels) in [(2, 2), (3, 3), (1, 2), (2, 3)] {
             let wins: Vec<f64> = [(8, 0.01), (8, 0.1), (24, 0.01), (24, 0.1)]

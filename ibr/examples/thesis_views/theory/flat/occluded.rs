@@ -17,7 +17,7 @@ use crate::theory::jump::jump_error;
 use crate::theory::periodic::PeriodicSets;
 use crate::theory::piecewise_linear::PiecewiseLinear;
 use crate::theory::random::{part, seeded};
-use hybank::sampling::nonuniform::Measured;
+use hybank_sampling::nonuniform::Measured;
 
 /// Pixels at which means over the view are taken.
 const NODES: usize = 1500;

@@ -4,7 +4,7 @@
 use super::{Errors, FlatCamera, FlatRig, parameter_at};
 use crate::theory::piecewise_linear::PiecewiseLinear;
 use crate::theory::random::{part, seeded};
-use hybank::sampling::nonuniform::Measured;
+use hybank_sampling::nonuniform::Measured;
 use rand_pcg::Pcg64;
 
 /// Positions at which a view is compared.

@@ -1,1 +1,0 @@
-../../../tools/trials/src/lib.rs
