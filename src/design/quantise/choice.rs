@@ -50,7 +50,8 @@ pub(in crate::design) fn quantise_within(
         snr_loss_db,
         taps_left_out: (0..problem.taps[0].len()).filter(|&n| is_left_out(&fixed_point, n)).count(),
     };
-    Ok((fixed_point, WordStudy { real_gamma, words, choice: Some(choice) }))
+    let least_gamma = quantiser.error.least_gamma;
+    Ok((fixed_point, WordStudy { real_gamma, least_gamma, words, choice: Some(choice) }))
 }
 
 /// Word lengths that differ by a bit, the shortest first.

@@ -36,6 +36,9 @@ const NEIGHBOURS: [i32; 5] = [-2, -1, 0, 1, 2];
 pub struct WordStudy {
     /// Computed gamma of the real taps.
     pub real_gamma: f64,
+    /// Smaller gammas are rounding errors.
+    #[serde(skip)]
+    pub(super) least_gamma: f64,
     /// In ascending order of the bits.
     pub words: Vec<WordLoss>,
     /// How the bits were chosen, where a loss was given.
@@ -71,10 +74,9 @@ pub struct WordChoice {
 }
 
 impl WordStudy {
-    /// `gamma` over that of the real taps in decibels: 0 where both are zero, infinite where only the real
-    /// one is.
+    /// `gamma` over that of the real taps in decibels: 0 where both are rounding errors.
     pub fn loss_db(&self, gamma: f64) -> f64 {
-        20.0 * decades(gamma, self.real_gamma)
+        20.0 * decades(gamma.max(self.least_gamma), self.real_gamma.max(self.least_gamma))
     }
 }
 
@@ -122,7 +124,10 @@ pub(super) fn quantise(
         Some(fraction_bits) if quantiser.does_nothing(&asked)? => {
             Err(DesignError::TinyTaps { fraction_bits, fitting: quantiser.finest_that_fits(bits) })
         }
-        _ => Ok((asked.fixed_point, WordStudy { real_gamma, words, choice: None })),
+        _ => {
+            let least_gamma = quantiser.error.least_gamma;
+            Ok((asked.fixed_point, WordStudy { real_gamma, least_gamma, words, choice: None }))
+        }
     }
 }
 

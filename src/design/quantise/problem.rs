@@ -47,6 +47,8 @@ pub(super) struct Candidate {
 
 /// Mean squares below this, relative to that of zero taps, are zero up to rounding.
 const ZERO_MEAN_SQUARE: f64 = 1e-20;
+/// Share of the gamma of zero output below which gamma is rounding of the sums of target and filters.
+const ZERO_GAMMA: f64 = 4.0 * f64::EPSILON;
 
 /// Estimates of the error of integer taps, on a grid of frequencies.
 pub(super) struct TapError<'a> {
@@ -58,6 +60,8 @@ pub(super) struct TapError<'a> {
     pub(super) forms: Forms,
     /// Estimate of gamma of the real taps.
     pub(super) real_gamma: f64,
+    /// The least gamma that counts.
+    pub(super) least_gamma: f64,
     /// Mean square of the real taps, as in [`Candidate`].
     pub(super) real_mean_square: f64,
     /// The least mean square that counts.
@@ -76,11 +80,22 @@ impl<'a> TapError<'a> {
         let points = grid.points();
         let forms = Forms::new(&points);
         let real_gamma = grid.peaks(&lags, 0.0)?.estimate;
-        let zeros = vec![vec![0.0; problem.taps[0].len()]; problem.taps.len()];
-        let least_mean_square = ZERO_MEAN_SQUARE * grid.mean_square(&polyphase(&zeros, ratio));
+        let zeros = polyphase(&vec![vec![0.0; problem.taps[0].len()]; problem.taps.len()], ratio);
+        let least_gamma = ZERO_GAMMA * grid.peaks(&zeros, 0.0)?.estimate;
+        let least_mean_square = ZERO_MEAN_SQUARE * grid.mean_square(&zeros);
         let real = grid.mean_square(&lags) + output_noise(problem.noise, problem.taps);
         let real_mean_square = real.max(least_mean_square);
-        Ok(Self { problem, ratio, grid, points, forms, real_gamma, real_mean_square, least_mean_square })
+        Ok(Self {
+            problem,
+            ratio,
+            grid,
+            points,
+            forms,
+            real_gamma,
+            least_gamma,
+            real_mean_square,
+            least_mean_square,
+        })
     }
 
     /// The error of integer taps.

@@ -145,11 +145,16 @@ impl<'a> Quantiser<'a> {
         let bits = found.fixed_point.bits.clone();
         Ok(WordLoss {
             fraction_bits: found.fixed_point.fraction_bits,
-            loss_db: 20.0 * decades(found.gamma, self.error.real_gamma),
+            loss_db: self.loss_db(found.gamma),
             mean_square_loss_db: self.mean_square_loss_db(found),
-            rounded_loss_db: 20.0 * decades(self.rounded(&bits, fraction_bits)?, self.error.real_gamma),
+            rounded_loss_db: self.loss_db(self.rounded(&bits, fraction_bits)?),
             bits,
         })
+    }
+
+    fn loss_db(&self, gamma: f64) -> f64 {
+        let TapError { real_gamma, least_gamma, .. } = self.error;
+        20.0 * decades(gamma.max(least_gamma), real_gamma.max(least_gamma))
     }
 
     pub(super) fn mean_square_loss_db(&self, found: &Candidate) -> f64 {

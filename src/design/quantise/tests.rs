@@ -267,10 +267,12 @@ fn a_scale_beyond_the_limits_is_not_chosen() {
 
 #[test]
 fn a_loss_over_nothing_is_a_number() {
-    let study = |real_gamma| WordStudy { real_gamma, words: Vec::new(), choice: None };
-    assert_eq!(study(0.0).loss_db(0.0), 0.0);
-    assert_eq!(study(0.0).loss_db(1e-17), f64::INFINITY);
-    assert!((study(0.5).loss_db(5.0) - 20.0).abs() < 1e-12);
+    let study =
+        |real_gamma, least_gamma| WordStudy { real_gamma, least_gamma, words: Vec::new(), choice: None };
+    assert_eq!(study(0.0, 0.0).loss_db(0.0), 0.0);
+    assert_eq!(study(2e-16, 1e-15).loss_db(0.0), 0.0);
+    assert_eq!(study(0.0, 1e-15).loss_db(3e-16), 0.0);
+    assert!((study(0.5, 1e-15).loss_db(5.0) - 20.0).abs() < 1e-12);
 }
 
 /// No other taps have a smaller mean square, error and noise together: judged by the error itself.
