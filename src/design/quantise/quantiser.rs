@@ -121,18 +121,6 @@ impl<'a> Quantiser<'a> {
         found.mean_square <= self.most_mean_square
     }
 
-    /// The bits with which rounding adds, on average, the mean square that is left: step^2 / 12 times the
-    /// power that each tap sees.
-    pub(super) fn bits_by_rounding(&self) -> u32 {
-        let taps = self.error.problem.taps;
-        let seen: f64 =
-            self.error.powers().iter().zip(taps).map(|(power, taps)| power * taps.len() as f64).sum();
-        let left = self.most_mean_square - self.error.real_mean_square;
-        let most = taps.iter().flatten().fold(0.0f64, |most, tap| most.max(tap.abs()));
-        let magnitude = (most / (12.0 * left / seen).sqrt()).log2();
-        magnitude.ceil().clamp(0.0, f64::from(MAX_BITS)) as u32 + 1
-    }
-
     /// What integers lose whose scale was fixed to `fraction_bits`, or chosen.
     ///
     /// # Errors
