@@ -6,7 +6,7 @@ use super::search::Search;
 use super::{WordLoss, decades};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
-use crate::spec::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
+use crate::spec::{MAX_FRACTION_BITS, WordLengths};
 use rayon::prelude::*;
 
 /// Relative difference of gamma below which the mean square decides: 0.001 dB.
