@@ -33,10 +33,11 @@ pub(in crate::design) fn quantise_within(
 ) -> Result<(FixedPoint, WordStudy), DesignError> {
     let quantiser = Quantiser::within(problem, allowance.loss_db)?;
     let fewest = fewest_bits(&quantiser, allowance)?;
-    let chosen = leave_out(&quantiser, &fewest)?;
-    let bits = &fewest.fixed_point.bits;
-    let beside: Vec<WordLengths> = NEIGHBOURS.into_iter().filter_map(|more| bits.widened(more)).collect();
-    let beside = quantiser.quantise_all(&beside, None)?;
+    let more_or_fewer = NEIGHBOURS.into_iter().filter_map(|more| fewest.fixed_point.bits.widened(more));
+    let beside = quantiser.quantise_all(&more_or_fewer.collect::<Vec<_>>(), None)?;
+    // The search does not always find the best integers, so fewer bits may keep to the loss too.
+    let fewest = beside.iter().find(|found| quantiser.keeps(found)).unwrap_or(&fewest);
+    let chosen = leave_out(&quantiser, fewest)?;
     let words = beside.iter().map(|found| quantiser.loss(found, None)).collect::<Result<_, _>>()?;
     let snr_loss_db = quantiser.mean_square_loss_db(&chosen);
     let fixed_point = without_zeros(chosen.fixed_point);
