@@ -110,7 +110,8 @@ impl Counts {
 /// Some of the samples (of the output) or frames (of the input) from `first` to `last`, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 struct Span {
-    /// `replaced` (input samples that were NaN or infinite became 0) or `clipped` (output samples saturated).
+    /// `replaced` (input samples that were NaN or infinite became 0) or `clipped` (output samples
+    /// saturated).
     #[serde(skip)]
     event: &'static str,
     first: u64,

@@ -50,9 +50,10 @@ pub struct MultiReader {
 }
 
 impl MultiReader {
-    /// Starts reading and waits for the headers; tells `on_stall` of those that do not come. `-` is standard input. A name that ends in sigmf-meta or
-    /// sigmf-data is a SigMF recording, everything else is as [`ReadOptions::coding`] says. Time counts
-    /// from the earliest sample whose number is known: inputs that join late begin with lost samples.
+    /// Starts reading and waits for the headers; tells `on_stall` of those that do not come. `-` is standard
+    /// input. A name that ends in sigmf-meta or sigmf-data is a SigMF recording, everything else is as
+    /// [`ReadOptions::coding`] says. Time counts from the earliest sample whose number is known: inputs that
+    /// join late begin with lost samples.
     ///
     /// # Errors
     /// [`IoError`] for an input that cannot be read or is not plain PCM, for a pipe that is given twice,

@@ -97,8 +97,8 @@ fn study_of(nominal: &Synthesis, search: &BoxSearch) -> Result<RobustStudy, Desi
     })
 }
 
-/// The exchange, with what it found for the study. Where the taps are worse between the errors or frequencies
-/// that the search looks at, it is repeated with these.
+/// The exchange, with what it found for the study. Where the taps are worse between the errors or
+/// frequencies that the search looks at, it is repeated with these.
 fn least_worst_norm(
     plant: &LiftedPlant,
     search: BoxSearch,

@@ -82,7 +82,8 @@ impl BoxSearch {
         combination
     }
 
-    /// The errors of the largest norm of a bank found over the box; no errors are among those that are tried.
+    /// The errors of the largest norm of a bank found over the box; no errors are among those that are
+    /// tried.
     ///
     /// # Errors
     /// As [`BoxSearch::peaks`], and [`DesignError::Lti`] for unstable filters.

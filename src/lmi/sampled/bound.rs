@@ -30,13 +30,13 @@ const ROUNDING_PER_OPERATION: f64 = 16.0;
 pub struct LowerBound {
     /// `gamma(F) >= value` for the taps covered; never negative.
     pub value: f64,
-    /// Whether all taps are covered: larger taps than those within the radius have a larger worst case in any
-    /// case. Otherwise the bound holds for taps up to a thousand times the size of those found.
+    /// Whether all taps are covered: larger taps than those within the radius have a larger worst case in
+    /// any case. Otherwise the bound holds for taps up to a thousand times the size of those found.
     pub covers_all: bool,
 }
 
-/// The taps for which a lower bound is computed: those of at most a size. The size of taps is `sqrt(sum_{p,i,j}
-/// (s_i F_j[p,i])^2)` with `s_i` the largest row norm of channel i over the points.
+/// The taps for which a lower bound is computed: those of at most a size. The size of taps is
+/// `sqrt(sum_{p,i,j} (s_i F_j[p,i])^2)` with `s_i` the largest row norm of channel i over the points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Coverage {
     radius: f64,

@@ -30,8 +30,8 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     /// Frames of a vector.
     const FRAMES: usize = V::LANES / D;
     /// Vectors of the largest tile: as many as registers hold, and at most 6, as compilers spill more. Where
-    /// each frame has one lane the end of a tile needs registers too. Twelve sums of steps that do not fill a
-    /// group leave no register free for a coefficient: compilers spill some, and eight are a third faster.
+    /// each frame has one lane the end of a tile needs registers too. Twelve sums of steps that do not fill
+    /// a group leave no register free for a coefficient: compilers spill some, and eight are a third faster.
     const MOST: usize = {
         let most = match (P, V::SUMS) {
             (4, 12) if D < V::GROUP => 2,
