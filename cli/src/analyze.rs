@@ -6,12 +6,13 @@ use super::design_studies::number;
 use super::print::{Failure, InFile, show};
 use hybank::bank::Bank;
 use hybank::design::uncertainty::{BoxRule, BoxStudy, BoxWidths, RefusedBox};
-use hybank::design::{self, Analysis, Certified, DesignError, GammaScale, MeanAnalysis};
+use hybank::design::{self, Analysis, DesignError, GammaScale, MeanAnalysis};
 use hybank::figures::{Figures, KeyFigures};
 use hybank::overview::{decibels, frequency, key_figures, six_digits, understood};
 use hybank::quantity::{self, Time, readable};
 use hybank::spec::{ErrorBox, ErrorPoint};
 use hybank::units::Seconds;
+use hybank::verify::Verified;
 use std::path::PathBuf;
 
 /// Computes the gamma of a bank, with the delays of its spec or with others
@@ -104,7 +105,7 @@ struct Report {
     #[serde(flatten)]
     analysis: Analysis,
     #[serde(skip_serializing_if = "Option::is_none")]
-    certified: Option<Certified>,
+    certified: Option<Verified>,
     /// With the delays of the bank.
     figures: Figures,
     /// With the delays that are given.
@@ -120,7 +121,7 @@ impl Report {
         let proof = self.certified.map_or_else(String::new, |proof| {
             format!(
                 "certified    {}   proven upper bound (P of order {}; at least {} is proven as well)\n",
-                number(proof.gamma),
+                number(proof.upper),
                 proof.states,
                 number(proof.attained)
             )

@@ -1,6 +1,7 @@
 //! `fuse --bit-true`: integer taps on the integers of the captures, as hardware has them.
 
 use super::before_after;
+use super::observer::RunObserver;
 use super::output::begin_samples;
 use super::print::{Failure, check_strict, failed, name, print, print_report, stopped, warn};
 use super::run::{Job, each_block};
@@ -56,6 +57,7 @@ impl BitTrueArgs {
         self,
         job: &Job<'_>,
         reader: &mut MultiReader,
+        observer: &mut RunObserver,
         measured: impl FnOnce() -> Result<Option<BeforeAfter>, Failure>,
     ) -> Result<(), Failure> {
         let rate = job.output_rate(reader)?;
@@ -68,7 +70,7 @@ impl BitTrueArgs {
         let output = begin_samples(job.output, header, job.args.force).map_err(stopped)?;
         let skip = if job.dropped == DroppedLatency::All { job.bank.output_delay() } else { 0 };
         let mut run = Run::new(model, output, format, skip, job.bank);
-        each_block(reader, |recordings| run.process(recordings))?;
+        each_block(reader, observer, |_, recordings| run.process(recordings))?;
         let frames = reader.consumed();
         run.flush()?;
         let mut report = Report {
@@ -151,33 +153,23 @@ impl Run {
     /// Frames without a signal, until M samples have come out for each frame of the captures.
     fn flush(&mut self) -> Result<(), Failure> {
         let (frames, resting) = (self.owed.div_ceil(self.ratio), self.model.resting());
-        let mut fast = self.filtered(&resting.repeat(frames), resting.len());
+        let mut fast = self.model.filtered(&resting.repeat(frames));
         fast.truncate(self.owed);
         self.write(&fast)
     }
 
     fn process(&mut self, recordings: &[PcmFrames<'_>]) -> Result<(), Failure> {
-        let channels = recordings.channels();
-        let mut numbers = vec![0.0f64; recordings.frames() * channels];
+        let mut numbers = vec![0.0f64; recordings.frames() * recordings.channels()];
         recordings.load_f64(Isa::detect(), 0, &mut numbers);
         // A power of two: the product is the integer itself.
         let frames: Vec<i32> = numbers.iter().map(|x| (x * self.full_scale()) as i32).collect();
-        let fast = self.filtered(&frames, channels);
+        let fast = self.model.filtered(&frames);
         self.write(&fast)
     }
 
     /// The integer that stands for 1.
     fn full_scale(&self) -> f64 {
         (8.0 * self.format.bytes() as f64 - 1.0).exp2()
-    }
-
-    fn filtered(&mut self, frames: &[i32], channels: usize) -> Vec<i32> {
-        let channels = channels.max(1);
-        let mut fast = vec![0; frames.len() / channels * self.ratio];
-        for (frame, fast) in frames.chunks_exact(channels).zip(fast.chunks_exact_mut(self.ratio)) {
-            self.model.process(frame, fast);
-        }
-        fast
     }
 
     fn write(&mut self, fast: &[i32]) -> Result<(), Failure> {

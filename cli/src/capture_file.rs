@@ -85,7 +85,7 @@ impl CaptureFile {
 
 /// A reader of the headers of all inputs.
 pub(super) fn start(inputs: &[PathBuf], options: ReadOptions<'_>) -> Result<MultiReader, Failure> {
-    MultiReader::start(inputs, options).map_err(unreadable)
+    MultiReader::start(inputs, options, &mut |_| {}).map_err(unreadable)
 }
 
 /// Why samples could not be read.

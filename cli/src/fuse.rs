@@ -9,7 +9,7 @@ use super::output::bits;
 use super::print::{Failure, is_dash, print, print_report, say_understood};
 use super::run::{Finished, Job, RunArgs, RunReport};
 use hybank::bank::Bank;
-use hybank::io::{Container, MultiReader, PcmFormat};
+use hybank::io::{Container, MultiReader, OnStall, PcmFormat};
 use hybank::messages::{Quoted, counted};
 use hybank::overview::BeforeAfter;
 use hybank::pipeline::DroppedLatency;
@@ -141,9 +141,9 @@ impl Args {
 
     fn fuse(&self, job: &Job<'_>, observer: &mut RunObserver) -> Result<(), Failure> {
         let begin = Instant::now();
-        let mut reader = self.start_reader(job, Some(observer))?;
+        let mut reader = self.start_reader(job, &mut |stall| observer.stalled(stall))?;
         if self.bit_true.is_wanted() {
-            return self.bit_true.fuse(job, &mut reader, || self.measured(job));
+            return self.bit_true.fuse(job, &mut reader, observer, || self.measured(job));
         }
         let rate = job.output_rate(&reader)?;
         let progress = progress_bar(reader.promised_frames());
@@ -167,8 +167,8 @@ impl Args {
         print(&report.text(&self.output))
     }
 
-    fn start_reader(&self, job: &Job<'_>, observer: Option<&RunObserver>) -> Result<MultiReader, Failure> {
-        job.start_reader(&self.inputs, self.reading.format(), observer)
+    fn start_reader(&self, job: &Job<'_>, on_stall: OnStall<'_>) -> Result<MultiReader, Failure> {
+        job.start_reader(&self.inputs, self.reading.format(), on_stall)
     }
 
     /// Reads the inputs once more, and the output.
@@ -176,7 +176,7 @@ impl Args {
         if !self.before_after.is_wanted() {
             return Ok(None);
         }
-        let reader = self.start_reader(job, None)?;
+        let reader = self.start_reader(job, &mut |_| {})?;
         self.before_after.measured(job.bank, reader, &self.output, self.run.force).map(Some)
     }
 }

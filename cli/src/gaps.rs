@@ -123,7 +123,7 @@ pub(super) fn say_gaps(gaps: &GapSummary, are_said: bool) {
         return say_line(&format!("gap: {} in all, {} samples missing", gaps.count, gaps.missing));
     }
     for gap in gaps.list.iter().take(REPORTED) {
-        say_line(&format!("gap: channel {}, sample {}, {} missing", gap.channel, gap.first, gap.length));
+        say_line(&gap.to_string());
     }
     if gaps.count > REPORTED as u64 {
         say_line(&format!("gap: {} in all; --json lists them", gaps.count));

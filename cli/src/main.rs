@@ -17,7 +17,7 @@ mod demo;
 mod design;
 mod design_report;
 mod design_studies;
-mod event;
+mod event_file;
 mod export;
 mod file_kind;
 mod fuse;

@@ -1,23 +1,24 @@
 //! The observer of a run: reports what happens while it happens, as lines on standard error and as JSON
 //! lines in the file of `--report`, and checks the captures.
 
-use super::capture_check::{CaptureCheck, Checked};
-use super::event::{Event, Events, Span};
-use super::print::{Failure, failed, is_dash, say_line};
+use super::capture_check::CaptureCheck;
+use super::event_file::EventFile;
+use super::print::{Failure, is_dash, say_line};
 use hybank::bank::Bank;
-use hybank::io::{PcmFrames, StallWatch};
+use hybank::calibrate::{Agreement, Verdict};
+use hybank::io::{PcmFrames, Stall};
 use hybank::pipeline::{Gap, Pipeline};
 use hybank::runtime::Input;
+use serde::Serialize;
+use serde_json::json;
 use std::collections::BTreeSet;
+use std::fmt;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Least time between two looks at what happens often, so that a line of each kind counts what it leaves
 /// out.
 const INTERVAL: Duration = Duration::from_secs(1);
-/// Time after which an input that gives nothing is reported.
-const PATIENCE: Duration = Duration::from_secs(1);
 /// Samples of a gap that is reported before it ends: a second, and no fewer than these.
 const LONG_GAP: f64 = 1000.0;
 
@@ -54,7 +55,7 @@ impl ObserverArgs {
     pub(super) fn begin(&self, bank: &Bank, force: bool, live: bool) -> Result<RunObserver, Failure> {
         let counts = Counts::default();
         Ok(RunObserver {
-            events: Events::begin(self.report(), force)?,
+            file: EventFile::begin(self.report(), force)?,
             check: None,
             is_live: live,
             written: counts,
@@ -68,7 +69,7 @@ impl ObserverArgs {
 
 /// Observes a run.
 pub(super) struct RunObserver {
-    events: Events,
+    file: EventFile,
     check: Option<CaptureCheck>,
     is_live: bool,
     /// What the report has, and what standard error has.
@@ -93,56 +94,101 @@ struct Counts {
 
 impl Counts {
     /// What was replaced and clipped until `later`.
-    fn spans(&self, later: &Self) -> impl Iterator<Item = Event> {
-        let replaced = span(self.frames, later.frames, later.replaced - self.replaced).map(Event::Replaced);
-        let clipped = span(self.samples, later.samples, later.clipped - self.clipped).map(Event::Clipped);
-        replaced.into_iter().chain(clipped)
+    fn spans(&self, later: &Self) -> impl Iterator<Item = Span> {
+        let span = |event, first: u64, end: u64, samples| Span {
+            event,
+            first,
+            last: end.saturating_sub(1).max(first),
+            samples,
+        };
+        let replaced = span("replaced", self.frames, later.frames, later.replaced - self.replaced);
+        let clipped = span("clipped", self.samples, later.samples, later.clipped - self.clipped);
+        [replaced, clipped].into_iter().filter(|span| span.samples > 0)
     }
 }
 
-/// So many samples from `begin` to before `end`, if there are any.
-fn span(begin: u64, end: u64, samples: u64) -> Option<Span> {
-    (samples > 0).then(|| Span { first: begin, last: end.saturating_sub(1).max(begin), samples })
+/// Some of the samples (of the output) or frames (of the input) from `first` to `last`, from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+struct Span {
+    /// `replaced` (input samples that were NaN or infinite became 0) or `clipped` (output samples
+    /// saturated).
+    #[serde(skip)]
+    event: &'static str,
+    first: u64,
+    last: u64,
+    /// How many samples.
+    samples: u64,
+}
+
+impl fmt::Display for Span {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { event, first, last, samples } = self;
+        match *event {
+            "replaced" => {
+                write!(f, "not finite: {samples} input samples of frames {first} to {last} became 0")
+            }
+            _ => write!(f, "clipped: {samples} of the output samples {first} to {last}"),
+        }
+    }
 }
 
 /// The last of some gaps, and how many there are.
 fn gap_line(gaps: &[Gap]) -> Option<String> {
-    let last = Event::Gap(*gaps.last()?);
+    let last = gaps.last()?.to_string();
     let missing: u64 = gaps.iter().map(|gap| gap.length).sum();
     Some(match gaps.len() {
-        1 => last.to_string(),
+        1 => last,
         count => format!("{last}; {count} gaps with {missing} samples since the last line"),
     })
 }
 
 impl RunObserver {
-    /// Where other threads report events.
-    pub(super) fn events(&self) -> Events {
-        self.events.clone()
+    /// Says an event, and writes it to the report.
+    fn tell(&mut self, event: &str, data: &impl Serialize, text: &str) {
+        say_line(text);
+        self.file.write(event, data);
     }
 
-    /// Where the readers report inputs that give nothing.
-    pub(super) fn stall_watch(&self) -> StallWatch {
-        let events = self.events();
-        StallWatch { patience: PATIENCE, report: Arc::new(move |stall| events.tell(&stall.into())) }
+    /// Reports an input that gives nothing, or does again.
+    pub(super) fn stalled(&mut self, stall: &Stall) {
+        self.tell_news();
+        self.tell(if stall.is_over { "stall_over" } else { "stall" }, stall, &stall.to_string());
     }
 
     /// From now on the captures are compared with the spec of the bank, if they are `comparable`. In a live
     /// run the warnings come as soon as they are known.
     pub(super) fn check_captures(&mut self, bank: &Bank, comparable: bool) {
-        self.check = Some(CaptureCheck::new(bank, comparable, self.is_live.then(|| self.events())));
+        self.check = Some(CaptureCheck::new(bank, comparable, self.is_live));
     }
 
     /// What the comparison found.
-    pub(super) fn checked(&mut self) -> Checked {
-        self.check.take().map_or_else(Checked::default, CaptureCheck::finish)
+    pub(super) fn checked(&mut self) -> Agreement {
+        let is_known = matches!(self.check, Some(CaptureCheck::Done(_)));
+        let found = self.check.as_mut().map_or_else(|| Verdict::Unjudged.into(), CaptureCheck::finish);
+        if !is_known {
+            self.warn(&found);
+        }
+        found
+    }
+
+    fn tell_news(&mut self) {
+        if let Some(found) = self.check.as_mut().and_then(CaptureCheck::news) {
+            self.warn(&found);
+        }
+    }
+
+    /// What the comparison found, in a live run.
+    fn warn(&mut self, found: &Agreement) {
+        for text in found.warnings().iter().filter(|_| self.is_live) {
+            say_line(&format!("warning: {text}"));
+            self.file.write("warning", &json!({ "text": text }));
+        }
     }
 
     /// Reports what happened since the last call, with the frames of this step.
     pub(super) fn step(&mut self, recordings: &[PcmFrames<'_>], pipeline: &Pipeline<'_>) {
-        if let Some(check) = &mut self.check {
-            check.observe(recordings);
-        }
+        self.check.iter_mut().for_each(|check| check.observe(recordings));
+        self.tell_news();
         let now = Counts {
             frames: self.written.frames + recordings.frames() as u64,
             samples: pipeline.samples(),
@@ -150,8 +196,8 @@ impl RunObserver {
             replaced: pipeline.replaced(),
             clipped: pipeline.clipped(),
         };
-        pipeline.gaps()[self.written.gaps..].iter().for_each(|&gap| self.events.write(&Event::Gap(gap)));
-        self.written.spans(&now).for_each(|event| self.events.write(&event));
+        pipeline.gaps()[self.written.gaps..].iter().for_each(|gap| self.file.write("gap", gap));
+        self.written.spans(&now).for_each(|span| self.file.write(span.event, &span));
         self.written = now;
         self.report_long_gaps(pipeline);
         if self.is_live && Instant::now() >= self.due {
@@ -162,7 +208,7 @@ impl RunObserver {
     /// Says what has happened since the last time.
     fn say(&mut self, gaps: &[Gap]) {
         let gap = gap_line(&gaps[self.said.gaps..]);
-        let spans = self.said.spans(&self.written).map(|event| event.to_string());
+        let spans = self.said.spans(&self.written).map(|span| span.to_string());
         for line in gap.into_iter().chain(spans) {
             say_line(&line);
             self.due = Instant::now() + INTERVAL;
@@ -171,9 +217,10 @@ impl RunObserver {
     }
 
     fn report_long_gaps(&mut self, pipeline: &Pipeline<'_>) {
-        for gap in pipeline.open_gaps().filter(|gap| gap.length >= self.long_gap) {
+        let least = self.long_gap;
+        for gap in pipeline.open_gaps().filter(|gap| gap.length >= least) {
             if self.long_gaps.insert([gap.channel as u64, gap.first]) {
-                self.events.tell(&Event::GapGoesOn(gap));
+                self.tell("gap_goes_on", &gap, &format!("{gap} so far"));
             }
         }
     }
@@ -184,20 +231,15 @@ impl RunObserver {
     }
 
     /// Ends the report with the summary of the run.
-    pub(super) fn end(&mut self, summary: &impl serde::Serialize) -> Result<(), Failure> {
-        let mut last = serde_json::json!({ "event": "summary" });
-        let summary = serde_json::to_value(summary).map_err(failed)?;
-        if let (Some(last), serde_json::Value::Object(summary)) = (last.as_object_mut(), summary) {
-            last.extend(summary);
-        }
-        self.events.write(&last);
-        self.events.check()
+    pub(super) fn end(&mut self, summary: &impl Serialize) -> Result<(), Failure> {
+        self.file.write("summary", summary);
+        self.file.check()
     }
 
     /// Ends the report of a run that failed.
     pub(super) fn fail(&mut self, failure: &Failure) {
         if let Failure::Input(message) | Failure::Usage(message) = failure {
-            self.events.write(&serde_json::json!({ "event": "error", "message": message }));
+            self.file.write("error", &json!({ "message": message }));
         }
     }
 }
@@ -211,7 +253,7 @@ mod tests {
         let before = Counts { frames: 10, samples: 20, gaps: 1, replaced: 3, clipped: 0 };
         assert_eq!(before.spans(&before).count(), 0);
         let later = Counts { frames: 15, samples: 30, gaps: 1, replaced: 5, clipped: 4 };
-        let spans: Vec<String> = before.spans(&later).map(|event| event.to_string()).collect();
+        let spans: Vec<String> = before.spans(&later).map(|span| span.to_string()).collect();
         assert_eq!(
             spans,
             [

@@ -11,8 +11,8 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hybank::bank::Bank;
 use hybank::captures::{Converters, FileFormat};
 use hybank::io::{
-    Arrival, BLOCK_BYTES, Container, MultiReader, OutputHeader, OutputNotes, PcmFormat, PcmFrames, Placement,
-    ReadOptions, is_sigmf,
+    Arrival, BLOCK_BYTES, Container, MultiReader, OnStall, OutputHeader, OutputNotes, PcmFormat, PcmFrames,
+    Placement, ReadOptions, is_sigmf,
 };
 use hybank::pipeline::{DroppedLatency, FileOutputs, Outcome, Pipeline, Settings, Warning};
 use hybank::runtime::{Algorithm, Input, Options, Plan, Precision, ThreadPool};
@@ -133,18 +133,17 @@ impl Job<'_> {
         &self,
         inputs: &[PathBuf],
         format: FileFormat,
-        observer: Option<&RunObserver>,
+        on_stall: OnStall<'_>,
     ) -> Result<MultiReader, Failure> {
         let args = self.args;
         let lost = args.gaps.lost_samples()?;
         let converters = Converters::from(self.bank);
         let interleaving = args.interleaved.interleaving(&converters, self.bank_path)?;
-        let stalls = observer.map(RunObserver::stall_watch);
         // Each thread takes about a block at a time, and more threads gain little.
         let block_bytes = if args.threads == 1 { BLOCK_BYTES } else { 8 * BLOCK_BYTES };
         let own = converters.options(format, inputs.len(), interleaving.as_ref());
-        let files = ReadOptions { block_bytes, stalls: stalls.as_ref(), ..own };
-        let started = MultiReader::start(inputs, args.gaps.read_options(lost.as_ref(), files));
+        let files = args.gaps.read_options(lost.as_ref(), ReadOptions { block_bytes, ..own });
+        let started = MultiReader::start(inputs, files, on_stall);
         let reader = started.map_err(unreadable)?;
         self.scale.check(&reader)?;
         Ok(reader)
@@ -213,7 +212,7 @@ impl Job<'_> {
         // A frame may hold several samples of a converter.
         let outcome = Outcome { channels: self.bank.channel_count(), ..outcome };
         let report = RunReport::new(outcome, self.tolerated(reader), self.lossless);
-        let report = report.with(checked.warnings, self.is_live);
+        let report = report.with(checked.warnings(), self.is_live);
         let shift = (latency - dropped) as u64;
         let (ratio, samples) = (self.bank.ratio as u64, report.outcome.samples);
         let placement = Placement { ratio, per_frame: 1, shift, samples };
@@ -221,7 +220,7 @@ impl Job<'_> {
         let peak = outputs.peak();
         self.complete(outputs, &report, observer)?;
         let frames = reader.consumed();
-        Ok(Finished { report, frames, is_interrupted, dropped, peak, captures: checked.verdict })
+        Ok(Finished { report, frames, is_interrupted, dropped, peak, captures: checked.summary() })
     }
 
     /// The outputs at their beginning, of `rate` hertz.
@@ -242,7 +241,7 @@ impl Job<'_> {
         observer: &mut RunObserver,
         each: &dyn Fn(u64),
     ) -> Result<bool, Failure> {
-        each_block(reader, |recordings| {
+        each_block(reader, observer, |observer, recordings| {
             pipeline.push(recordings, &mut |block| outputs.write(block)).map_err(stopped)?;
             observer.step(recordings, pipeline);
             each(recordings.frames() as u64);
@@ -318,12 +317,13 @@ impl Job<'_> {
 /// Hands over all frames, block by block; true if an interrupt ended them.
 pub(super) fn each_block(
     reader: &mut MultiReader,
-    mut take: impl FnMut(&[PcmFrames<'_>]) -> Result<(), Failure>,
+    observer: &mut RunObserver,
+    mut take: impl FnMut(&mut RunObserver, &[PcmFrames<'_>]) -> Result<(), Failure>,
 ) -> Result<bool, Failure> {
     loop {
-        match reader.wait().map_err(stopped)? {
+        match reader.wait(&mut |stall| observer.stalled(stall)).map_err(stopped)? {
             Arrival::Frames(count) => {
-                take(&reader.frames())?;
+                take(observer, &reader.frames())?;
                 reader.consume(count);
             }
             Arrival::End => return Ok(false),

@@ -129,7 +129,7 @@ impl Args {
         let plan = job.plan()?;
         let channels = self.channels.map(usize::from);
         let format = FileFormat { coding: self.format, channels, only: None, full_scale: self.scale.given() };
-        let mut reader = job.start_reader(inputs, format, Some(observer))?;
+        let mut reader = job.start_reader(inputs, format, &mut |stall| observer.stalled(stall))?;
         self.check_output(reader.is_complex())?;
         let finished = job.run(&plan, &mut reader, observer, &|_| {})?;
         let Finished { report: run, frames, is_interrupted, .. } = &finished;

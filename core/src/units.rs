@@ -250,13 +250,6 @@ impl RadiansPerSecond {
     }
 }
 
-impl RadiansPerFastPeriod {
-    /// w = w' / h.
-    pub fn per_second(self, fast_period: Seconds) -> RadiansPerSecond {
-        RadiansPerSecond(self.0 / fast_period.0)
-    }
-}
-
 impl RadiansPerSlowPeriod {
     /// f = W / (2 pi M h), with the slow period M h.
     pub fn in_hertz(self, slow_period: Seconds) -> Hertz {
@@ -304,7 +297,6 @@ mod tests {
         fn conversions_undo_each_other(x in wild(), h in wild()) {
             let h = Seconds(h.abs());
             prop_assert!(close(Seconds(x).in_fast_periods(h).in_seconds(h).0, x, 1.0));
-            prop_assert!(close(RadiansPerSecond(x).per_fast_period(h).per_second(h).0, x, 1.0));
             prop_assert!(close(Hertz(x).angular().in_hertz().0, x, 1.0));
             prop_assert!(close(Hertz(x).period().rate().0, x, 1.0));
         }

@@ -234,12 +234,7 @@ pub(crate) fn framed<'py>(
         rows.push(part.call_method1("reshape", (frames, *samples))?);
     }
     let all = numpy.call_method1("concatenate", (PyList::new(x.py(), rows)?, 1))?;
-    let is_list = given[0].is_instance_of::<PyList>() || given[0].is_instance_of::<PyTuple>();
-    let all = match is_list && all.getattr("dtype")?.getattr("kind")?.eq("i")? {
-        true => all.call_method1("astype", ("f8",))?,
-        false => all,
-    };
-    Ok((all, Shape { axis: 0, ..shape }))
+    Ok((samples_of(&given[0], all)?, Shape { axis: 0, ..shape }))
 }
 
 /// The array of a list, of an object of another package, or of a subclass.
@@ -250,8 +245,11 @@ fn plain<'py>(x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
             "samples are masked; x.filled(np.nan) marks them as missing, x.data takes them as they are",
         ));
     }
-    let array = numpy.call_method1("asarray", (x,))?;
-    // Numbers of a list are no samples of a converter.
+    samples_of(x, numpy.call_method1("asarray", (x,))?)
+}
+
+/// The `array` that NumPy makes of `x`; integers of a list are no samples of a converter.
+fn samples_of<'py>(x: &Bound<'py, PyAny>, array: Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let is_list = x.is_instance_of::<PyList>() || x.is_instance_of::<PyTuple>();
     match is_list && array.getattr("dtype")?.getattr("kind")?.eq("i")? {
         true => array.call_method1("astype", ("f8",)),

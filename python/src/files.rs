@@ -82,7 +82,7 @@ fn read_for<'py>(
         ..own
     };
     let read = py.detach(|| -> Result<_, CaptureError> {
-        let mut reader = MultiReader::start(files, read_options)?;
+        let mut reader = MultiReader::start(files, read_options, &mut |_| {})?;
         let output_rate = converters.map(|converters| converters.check("the bank", &reader));
         let output_rate = output_rate.transpose()?.flatten();
         // No bank is there to say whether it takes all rates.

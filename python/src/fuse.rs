@@ -7,9 +7,10 @@ use crate::formats::Format;
 use crate::outputs::NewArray;
 use crate::results::Made;
 use hybank::bank::Bank;
-use hybank::calibrate::{Record, agreement, comparable, frames_for_agreement};
+use hybank::calibrate::{Agreement, Record, Verdict, agreement, comparable, frames_for_agreement};
+use hybank::io::OfflineSamples;
 use hybank::pipeline::{self, DroppedLatency, GapPolicy, GapSummary, Outcome, Settings, Warning};
-use hybank::runtime::{Algorithm, Frames, Input, Isa, Options, PcmFormat, Plan, Precision, ThreadPool};
+use hybank::runtime::{Algorithm, Frames, Input, Options, PcmFormat, Plan, Precision, ThreadPool};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use std::time::Instant;
@@ -68,39 +69,22 @@ pub(crate) fn plan(
 }
 
 /// What captures say of the spec of a bank.
-#[derive(Default)]
-struct Captures {
-    verdict: String,
-    /// In what they contradict it.
-    warnings: Vec<String>,
-}
-
-impl Captures {
-    fn new(bank: &Bank, held: &Held<'_>) -> PyResult<Self> {
-        let spec = match comparable(bank.spec.as_ref(), !held.format.complex) {
-            Ok(spec) => spec.clone(),
-            Err(reason) => return Ok(Self { verdict: reason.to_string(), ..Self::default() }),
-        };
-        let channels = spec.channels.len();
-        let frames = held.frames().min(frames_for_agreement(channels));
-        let mut numbers = vec![0.0; frames * channels];
-        // There is nothing to load from no frames.
-        for part in held.parts()?.iter().filter(|_| frames > 0) {
-            part.as_slice().load_f64(Isa::detect(), 0, &mut numbers);
-        }
-        let channel = |i| Record::new(numbers.iter().skip(i).step_by(channels).copied().collect());
-        let records: Vec<Record> = (0..channels).map(channel).collect();
-        let found = background::run(held.py(), None, move |_| agreement(&spec, &records))?;
-        let warnings = found.contradictions.iter().map(ToString::to_string).collect();
-        Ok(Self { verdict: found.summary(), warnings })
-    }
+fn judged(bank: &Bank, held: &Held<'_>) -> PyResult<Agreement> {
+    let spec = match comparable(bank.spec.as_ref(), !held.format.complex) {
+        Ok(spec) => spec.clone(),
+        Err(reason) => return Ok(Verdict::Incomparable(reason).into()),
+    };
+    let most = frames_for_agreement(spec.channels.len());
+    let channels = OfflineSamples::of_frames(&held.recordings()?, most).channels;
+    let records: Vec<Record> = channels.into_iter().map(Record::new).collect();
+    background::run(held.py(), None, move |_| agreement(&spec, &records))
 }
 
 /// Output samples, and how they came about.
 pub(crate) struct Fused<'py> {
     pub(crate) y: Bound<'py, PyAny>,
     outcome: Outcome,
-    captures: Captures,
+    captures: Agreement,
     frames: usize,
     latency_dropped: usize,
     seconds: f64,
@@ -131,8 +115,8 @@ pub(crate) fn fuse<'py>(
     let outcome = Outcome { channels: bank.channel_count(), ..outcome };
     let seconds = begin.elapsed().as_secs_f64();
     let captures = match request.is_reported {
-        true => Captures::new(bank, &held)?,
-        false => Captures::default(),
+        true => judged(bank, &held)?,
+        false => Verdict::Unjudged.into(),
     };
     let (frames, number) = (held.frames(), format.number);
     let fused = Fused { y, outcome, captures, frames, latency_dropped, seconds, number };
@@ -164,7 +148,7 @@ impl Fused<'_> {
             Warning::Clipped(_) => format!("{warning}; a dtype of floats keeps them"),
             _ => warning.to_string(),
         };
-        self.outcome.warnings().map(text).chain(self.captures.warnings.iter().cloned()).collect()
+        self.outcome.warnings().map(text).chain(self.captures.warnings()).collect()
     }
 
     /// The report of a run with so many output samples per second, as that of the command line.
@@ -178,7 +162,7 @@ impl Fused<'_> {
         Made::of(py, "FuseReport", outcome)?
             .with("frames", *frames)?
             .with("rate", rate)?
-            .with("captures", &captures.verdict)?
+            .with("captures", captures.summary())?
             .with("latency_dropped", *latency_dropped)?
             .with("peak", pipeline::peak(*number, bytes.as_slice().map_err(refused)?))?
             .with("seconds", *seconds)?

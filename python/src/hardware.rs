@@ -109,12 +109,7 @@ pub(crate) fn fuse<'py>(
     let skip = if keep_latency { 0 } else { bank.output_delay() };
     let wanted = held.frames() * bank.ratio;
     frames.extend(model.resting().repeat(skip.div_ceil(bank.ratio)));
-    let fast = x.py().detach(|| {
-        let mut fast = vec![0; frames.len() / shape.channels * bank.ratio];
-        let outputs = fast.chunks_exact_mut(bank.ratio);
-        frames.chunks_exact(shape.channels).zip(outputs).for_each(|(frame, fast)| model.process(frame, fast));
-        fast
-    });
+    let fast = x.py().detach(|| model.filtered(&frames));
     model.warnings().iter().try_for_each(|warning| warn(x.py(), warning))?;
     let y = PyArray1::from_slice(x.py(), &fast[skip..skip + wanted]);
     y.call_method1("astype", (held.format.name(),))

@@ -28,7 +28,6 @@ mod recordings;
 mod responses;
 mod results;
 mod running;
-mod runs;
 mod simulate;
 mod sources;
 mod stream;

@@ -27,9 +27,14 @@ impl<'py> NewArray<'py> {
         Ok(Self { bytes: zeros(py, samples.saturating_mul(format.bytes()))?, format })
     }
 
+    /// Room for the bytes of the samples.
+    pub(crate) fn bytes(&mut self) -> PyResult<&mut [u8]> {
+        self.bytes.as_slice_mut().map_err(refused)
+    }
+
     /// Room for the samples; for the parts of complex ones once one of them is selected.
     pub(crate) fn room(&mut self) -> PyResult<PcmOutput<'_>> {
-        Ok(PcmOutput::packed(self.format.number, self.bytes.as_slice_mut().map_err(refused)?))
+        Ok(PcmOutput::packed(self.format.number, self.bytes()?))
     }
 
     /// The array.

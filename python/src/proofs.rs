@@ -12,7 +12,7 @@ use hybank::design::{self, DesignError};
 use hybank::figures::KeyFigures;
 use hybank::spec::ErrorBox;
 use hybank::units::Seconds;
-use hybank::verify as checker;
+use hybank::verify::{self as checker, Verified};
 use pyo3::prelude::*;
 use std::sync::Arc;
 
@@ -98,7 +98,7 @@ struct Studied {
     scale: design::GammaScale,
     figures: FiguresReport,
     with_errors: Option<KeyFigures>,
-    certified: Option<design::Certified>,
+    certified: Option<Verified>,
     worst_case: Option<BoxStudy>,
 }
 

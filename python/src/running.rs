@@ -1,67 +1,56 @@
-//! Runs that fill gaps, through the pipeline of the command line.
+//! The run of a stream, through the pipeline of the command line.
 
+use crate::errors::refused;
 use crate::formats::Format;
-use crate::fuse::plan;
 use hybank::bank::Bank;
 use hybank::io::IoError;
-use hybank::pipeline::{Block, Gap, Pipeline, PipelineError, Settings};
-use hybank::runtime::{Algorithm, PcmFrames};
+use hybank::pipeline::{Block, DroppedLatency, GapPolicy, Pipeline, Settings};
+use hybank::runtime::{PcmFrames, Plan};
 use pyo3::prelude::*;
+use std::io::Write;
 
-/// A run. Its outputs are collected until they are taken.
+/// A run, which the end of a `with` block closes.
 pub(crate) struct Running {
     pub(crate) pipeline: Pipeline<'static>,
-    /// Input frames.
-    pub(crate) frames: u64,
-    pub(crate) outputs: Outputs,
-}
-
-/// Outputs with their marks.
-#[derive(Default)]
-pub(crate) struct Outputs {
-    pub(crate) samples: Vec<u8>,
+    /// The marks of the outputs of the last call, if gaps are filled.
     pub(crate) mask: Vec<u8>,
-}
-
-impl Outputs {
-    fn add(&mut self, block: Block<'_>) -> Result<(), IoError> {
-        self.samples.extend_from_slice(block.samples);
-        self.mask.extend_from_slice(block.mask.unwrap_or_default());
-        Ok(())
-    }
+    pub(crate) is_closed: bool,
 }
 
 impl Running {
     /// A run of `bank` at its beginning.
-    pub(crate) fn new(
-        bank: &Bank,
-        format: Format,
-        algorithm: Algorithm,
-        settings: Settings<'static>,
-    ) -> PyResult<Self> {
-        let plan = plan(bank, format, algorithm, settings)?;
-        let pipeline = Pipeline::new(bank, &plan, settings, format.number, format.complex);
-        Ok(Self { pipeline, frames: 0, outputs: Outputs::default() })
+    pub(crate) fn new(bank: &Bank, plan: &Plan, format: Format, gaps: Option<GapPolicy>) -> Self {
+        let settings = Settings { dropped: DroppedLatency::Nothing, gaps, ..Settings::default() };
+        let pipeline = Pipeline::new(bank, plan, settings, format.number, format.complex);
+        Self { pipeline, mask: Vec::new(), is_closed: false }
     }
 
-    pub(crate) fn push(&mut self, recordings: &[PcmFrames<'_>], frames: usize) -> Result<(), PipelineError> {
-        self.frames += frames as u64;
-        self.pipeline.push(recordings, &mut |block| self.outputs.add(block))
-    }
-
-    /// Frames without a signal, until so many samples were written since the beginning.
-    pub(crate) fn flush(&mut self, until: u64) -> Result<(), PipelineError> {
-        self.pipeline.flush(until, &mut |block| self.outputs.add(block))
+    /// Filters frames into `room`, which has their size.
+    pub(crate) fn push(&mut self, recordings: &[PcmFrames<'_>], mut room: &mut [u8]) -> PyResult<()> {
+        self.begin()?;
+        let Self { pipeline, mask, .. } = self;
+        pipeline.push(recordings, &mut |block| keep(block, &mut room, mask)).map_err(refused)
     }
 
     /// The last samples of a stream: as many frames of them as the latency has.
-    pub(crate) fn drain(&mut self) -> Result<(), PipelineError> {
-        let plan = self.pipeline.plan();
-        self.flush(self.pipeline.samples() + (plan.flush_frames() * plan.ratio()) as u64)
+    pub(crate) fn drain(&mut self, mut room: &mut [u8]) -> PyResult<()> {
+        self.begin()?;
+        let Self { pipeline, mask, .. } = self;
+        let plan = pipeline.plan();
+        let samples = pipeline.samples() + (plan.flush_frames() * plan.ratio()) as u64;
+        pipeline.flush(samples, &mut |block| keep(block, &mut room, mask)).map_err(refused)
     }
 
-    /// All gaps so far: those that have ended, then those that go on.
-    pub(crate) fn gaps(&self) -> Vec<Gap> {
-        self.pipeline.gaps().iter().copied().chain(self.pipeline.open_gaps()).collect()
+    fn begin(&mut self) -> PyResult<()> {
+        if self.is_closed {
+            return Err(refused("the stream was closed at the end of its with block; make another one"));
+        }
+        self.mask.clear();
+        Ok(())
     }
+}
+
+fn keep(block: Block<'_>, room: &mut &mut [u8], mask: &mut Vec<u8>) -> Result<(), IoError> {
+    mask.extend_from_slice(block.mask.unwrap_or_default());
+    room.write_all(block.samples).map_err(IoError::system("the array", "write the samples"))
 }

@@ -7,10 +7,9 @@ use crate::formats::Format;
 use crate::fuse::{marks, parse_algorithm, plan};
 use crate::outputs::NewArray;
 use crate::running::Running;
-use crate::runs::{Runs, State};
 use hybank::bank::Bank;
-use hybank::pipeline::{GapPolicy, Settings};
-use hybank::runtime::{self, Plan};
+use hybank::pipeline::{GapPolicy, Pipeline, Settings};
+use hybank::runtime::Plan;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
@@ -28,7 +27,7 @@ pub(crate) struct Stream {
     shape: Shape,
     format: Format,
     gaps: Option<GapPolicy>,
-    state: Mutex<State>,
+    running: Mutex<Running>,
 }
 
 /// How a pickle makes a stream: a function and its arguments.
@@ -46,34 +45,28 @@ impl Stream {
         let format = dtype.map_or(Ok(Format::F32), Format::of_dtype)?;
         let shape = Shape { axis, channels: bank.frame_samples() };
         shape.check()?;
-        let algorithm_asked = parse_algorithm(algorithm)?.without_added_latency();
-        let plan = plan(bank, format, algorithm_asked, Settings { gaps, ..Settings::default() })?;
-        let runs = Runs::new(bank, &plan, format, algorithm_asked, gaps)?;
-        let state = Mutex::new(State { runs, closed: false });
-        Ok(Self { bank: Arc::clone(bank), asked: algorithm.to_owned(), plan, shape, format, gaps, state })
+        let asked = parse_algorithm(algorithm)?.without_added_latency();
+        let plan = plan(bank, format, asked, Settings { gaps, ..Settings::default() })?;
+        let running = Mutex::new(Running::new(bank, &plan, format, gaps));
+        Ok(Self { bank: Arc::clone(bank), asked: algorithm.to_owned(), plan, shape, format, gaps, running })
     }
 
     /// The same stream at the place of a state, if one is given.
     pub(crate) fn resumed(self, state: Option<&[u8]>) -> PyResult<Self> {
         if let Some(bytes) = state {
-            let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-            state.runs.resume(bytes)?;
+            self.check_stateful()?;
+            self.lock().pipeline.resume(bytes).map_err(refused)?;
         }
         Ok(self)
     }
 
-    /// To be called without the interpreter lock: the thread that holds the state may wait for that lock.
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    /// To be called without the interpreter lock: the thread that holds the run may wait for that lock.
+    fn lock(&self) -> MutexGuard<'_, Running> {
+        self.running.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn read<T: Send>(&self, py: Python<'_>, of: impl FnOnce(&Runs) -> T + Send) -> T {
-        py.detach(|| of(&self.lock().runs))
-    }
-
-    /// The outputs of a step.
-    fn collected<'py>(&self, py: Python<'py>, samples: Vec<u8>) -> PyResult<Bound<'py, PyAny>> {
-        PyArray1::from_vec(py, samples).call_method1("view", (self.format.name(),))
+    fn read<T: Send>(&self, py: Python<'_>, of: impl FnOnce(&Pipeline<'static>) -> T + Send) -> T {
+        py.detach(|| of(&self.lock().pipeline))
     }
 }
 
@@ -90,36 +83,27 @@ impl Stream {
         let (frames, shape) = framed(x, &self.bank.layout(), self.shape.axis, true)?;
         let held = Held::new(&frames, shape)?;
         self.check_parts(held.format)?;
-        if self.gaps.is_some() {
-            let (recordings, frames) = (held.recordings()?, held.frames());
-            let push = |running: &mut Running| running.push(&recordings, frames);
-            let samples = x.py().detach(|| self.lock().step(push))?;
-            return self.collected(x.py(), samples);
-        }
         let mut array = NewArray::new(x.py(), held.frames() * self.plan.ratio(), self.format)?;
-        let (parts, mut room) = (held.parts()?, array.room()?);
-        x.py().detach(|| self.lock().process(&parts, &mut room))?;
+        let (recordings, room) = (held.recordings()?, array.bytes()?);
+        x.py().detach(|| self.lock().push(&recordings, room))?;
         array.finish()
     }
 
     #[doc = include_str!("docs/Stream.flush.rst")]
     fn flush<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        if self.gaps.is_some() {
-            let samples = py.detach(|| self.lock().step(Running::drain))?;
-            return self.collected(py, samples);
-        }
         let mut array = NewArray::new(py, self.plan.flush_frames() * self.plan.ratio(), self.format)?;
-        let mut room = array.room()?;
-        py.detach(|| self.lock().flush(&mut room))?;
+        let room = array.bytes()?;
+        py.detach(|| self.lock().drain(room))?;
         array.finish()
     }
 
     #[doc = include_str!("docs/Stream.reset.rst")]
-    fn reset(&self, py: Python<'_>) -> PyResult<()> {
-        let algorithm = parse_algorithm(&self.asked)?.without_added_latency();
-        let runs = Runs::new(&self.bank, &self.plan, self.format, algorithm, self.gaps)?;
-        py.detach(|| self.lock().runs = runs);
-        Ok(())
+    fn reset(&self, py: Python<'_>) {
+        py.detach(|| {
+            let mut running = self.lock();
+            let new = Running::new(&self.bank, &self.plan, self.format, self.gaps);
+            *running = Running { is_closed: running.is_closed, ..new };
+        });
     }
 
     /// N, the samples of a frame.
@@ -162,88 +146,65 @@ impl Stream {
     /// Frames since the beginning.
     #[getter]
     fn position(&self, py: Python<'_>) -> u64 {
-        self.read(py, |runs| match runs {
-            Runs::Streams { streams, .. } => streams[0].position(),
-            Runs::Running(running) => running.frames,
-        })
+        self.read(py, Pipeline::position)
     }
 
     /// Numbers of the input that were NaN or infinite and became 0.
     #[getter]
     fn replaced(&self, py: Python<'_>) -> u64 {
-        self.read(py, |runs| match runs {
-            Runs::Streams { streams, .. } => streams.iter().map(runtime::Stream::replaced).sum(),
-            Runs::Running(running) => running.pipeline.replaced(),
-        })
+        self.read(py, Pipeline::replaced)
     }
 
     /// Output samples that saturated.
     #[getter]
     fn clipped(&self, py: Python<'_>) -> u64 {
-        self.read(py, |runs| match runs {
-            Runs::Streams { clipped, .. } => *clipped,
-            Runs::Running(running) => running.pipeline.clipped(),
-        })
+        self.read(py, Pipeline::clipped)
     }
 
     /// Times that the state of a recursion was not finite and became 0.
     #[getter]
     fn state_resets(&self, py: Python<'_>) -> u64 {
-        self.read(py, |runs| match runs {
-            Runs::Streams { streams, .. } => streams.iter().map(runtime::Stream::state_resets).sum(),
-            Runs::Running(running) => running.pipeline.state_resets(),
-        })
+        self.read(py, Pipeline::state_resets)
     }
 
-    /// The gaps so far as (channel from 1, first sample, length); the last ones may go on. None unless gaps
-    /// are filled.
+    /// The gaps so far as (channel from 1, first sample, length): those that have ended, then those that go
+    /// on. None unless gaps are filled.
     #[getter]
     fn gaps(&self, py: Python<'_>) -> Option<Vec<(usize, u64, u64)>> {
         self.gaps?;
-        self.read(py, |runs| match runs {
-            Runs::Streams { .. } => None,
-            Runs::Running(running) => {
-                Some(running.gaps().iter().map(|gap| (gap.channel, gap.first, gap.length)).collect())
-            }
-        })
+        Some(self.read(py, |pipeline| {
+            let gaps = pipeline.gaps().iter().copied().chain(pipeline.open_gaps());
+            gaps.map(|gap| (gap.channel, gap.first, gap.length)).collect()
+        }))
     }
 
     /// True where a missing sample affects the outputs of the last call. None unless gaps are filled.
     #[getter]
     fn mask(&self, py: Python<'_>) -> Option<Py<PyArray1<bool>>> {
         self.gaps?;
-        let mask = self.read(py, |runs| match runs {
-            Runs::Streams { .. } => Vec::new(),
-            Runs::Running(running) => running.outputs.mask.clone(),
-        });
+        let mask = py.detach(|| self.lock().mask.clone());
         Some(marks(py, &mask))
     }
 
     /// The state as bytes: `bank.stream(state=..)` goes on from there with the same bits, in any process. A
-    /// stream can be pickled too, with its bank.
+    /// stream can be pickled and copied too, with its bank.
     #[getter]
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        Ok(PyBytes::new(py, &self.read(py, Runs::bytes)?))
+        self.check_stateful()?;
+        Ok(PyBytes::new(py, &self.read(py, Pipeline::state)))
     }
 
     #[doc = include_str!("docs/Stream.agrees.rst")]
     fn agrees(&self, py: Python<'_>, state: &[u8]) -> bool {
-        self.read(py, |own| own.agrees(state))
-    }
-
-    /// A second stream at the same place.
-    fn __copy__(&self, py: Python<'_>) -> PyResult<Self> {
-        let (state, closed) = self.saved(py)?;
-        let dtype = self.format.name().into_pyobject(py)?;
-        Self::restored(&self.bank, self.shape.axis, &dtype, &self.asked, &state, closed)
+        self.gaps.is_none() && self.read(py, |pipeline| pipeline.agrees(state))
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
-        let py = slf.py();
-        let Self { bank, asked, shape, format, .. } = slf.get();
-        let (state, closed) = slf.get().saved(py)?;
-        let bank = PyBank { bank: Arc::clone(bank) }.into_pyobject(py)?;
-        let arguments = (bank, shape.axis, format.name(), asked.clone(), PyBytes::new(py, &state), closed);
+        let (py, own) = (slf.py(), slf.get());
+        let state = own.state(py)?;
+        let closed = py.detach(|| own.lock().is_closed);
+        let bank = PyBank { bank: Arc::clone(&own.bank) }.into_pyobject(py)?;
+        let arguments = (bank, own.shape.axis, own.format.name(), own.asked.clone(), state, closed);
         Ok((slf.get_type().getattr("_of")?, arguments))
     }
 
@@ -257,7 +218,9 @@ impl Stream {
         state: &[u8],
         closed: bool,
     ) -> PyResult<Self> {
-        Self::restored(&bank.bank, axis, dtype, algorithm, state, closed)
+        let stream = Self::new(&bank.bank, axis, Some(dtype), algorithm, None)?.resumed(Some(state))?;
+        stream.lock().is_closed = closed;
+        Ok(stream)
     }
 
     fn __enter__<'py>(slf: &Bound<'py, Self>) -> Bound<'py, Self> {
@@ -266,7 +229,7 @@ impl Stream {
 
     #[pyo3(signature = (*_exception))]
     fn __exit__(&self, py: Python<'_>, _exception: &Bound<'_, PyTuple>) {
-        py.detach(|| self.lock().closed = true);
+        py.detach(|| self.lock().is_closed = true);
     }
 
     fn __repr__(&self) -> String {
@@ -282,25 +245,13 @@ impl Stream {
 }
 
 impl Stream {
-    /// The state, and whether the stream is closed.
-    fn saved(&self, py: Python<'_>) -> PyResult<(Vec<u8>, bool)> {
-        py.detach(|| {
-            let state = self.lock();
-            Ok((state.runs.bytes()?, state.closed))
-        })
-    }
-
-    fn restored(
-        bank: &Arc<Bank>,
-        axis: isize,
-        dtype: &Bound<'_, PyAny>,
-        algorithm: &str,
-        state: &[u8],
-        closed: bool,
-    ) -> PyResult<Self> {
-        let stream = Self::new(bank, axis, Some(dtype), algorithm, None)?.resumed(Some(state))?;
-        stream.state.lock().unwrap_or_else(PoisonError::into_inner).closed = closed;
-        Ok(stream)
+    fn check_stateful(&self) -> PyResult<()> {
+        match self.gaps {
+            Some(_) => Err(refused(
+                "a stream that fills gaps cannot be copied, pickled or resumed; begin another one",
+            )),
+            None => Ok(()),
+        }
     }
 
     fn check_parts(&self, given: Format) -> PyResult<()> {

@@ -90,17 +90,6 @@ impl Engine {
         if let Self::Recursive(it) = self { it.state.resets } else { 0 }
     }
 
-    /// The state becomes that of a stream which has had the input of `running`; false, with the state as
-    /// before, if that cannot be known.
-    pub(crate) fn continue_from(&mut self, running: &Self) -> bool {
-        match (self, running) {
-            (Self::F32(Fir::Direct(it)), Self::F32(Fir::Direct(other))) => it.state.copy_input(&other.state),
-            (Self::F64(Fir::Direct(it)), Self::F64(Fir::Direct(other))) => it.state.copy_input(&other.state),
-            _ => return false,
-        }
-        true
-    }
-
     /// See [`Filter::count`].
     pub(crate) fn count(&self, place: usize) -> Count {
         each!(self, it => it.filter.count(place))

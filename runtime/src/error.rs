@@ -1,7 +1,5 @@
 //! Why a bank could not be made ready, a call was refused, or a plan was not taken over.
 
-use crate::sample::Shape;
-
 /// A bank that cannot run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -137,32 +135,6 @@ pub enum ProcessError {
         given: usize,
         /// Samples needed.
         wanted: usize,
-    },
-}
-
-/// Coefficients by which a stream cannot go on; it runs as before.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SwapError {
-    /// The plans have other numbers of channels or output samples.
-    #[error(
-        "the stream has N = {} channels and M = {}, the new plan {} and {}; a stream keeps its shape", from.channels, from.ratio, to.channels, to.ratio
-    )]
-    Shape {
-        /// Shape of the stream.
-        from: Shape,
-        /// Shape of the new plan.
-        to: Shape,
-    },
-    /// The state of the stream does not tell the state of the new plan.
-    #[error(
-        "a stream of `{from}` cannot go on by this plan of `{to}`: only the history of `direct` means the same to other filters, in the same number type"
-    )]
-    State {
-        /// Algorithm of the stream.
-        from: &'static str,
-        /// Algorithm of the new plan.
-        to: &'static str,
     },
 }
 

@@ -56,7 +56,7 @@ mod tests;
 pub use adapters::{Frames, Halves, Input, Interleaved, Output, PcmOutput, Planar, SplitOutput, Zeros};
 pub use algorithms::choice::{Algorithm, ParseAlgorithmError, Precision};
 pub use algorithms::recursive::{DelayLines, DelayedInput, StateSpace};
-pub use error::{BuildError, ProcessError, StateError, SwapError};
+pub use error::{BuildError, ProcessError, StateError};
 #[cfg(feature = "rayon")]
 pub use parallel::ThreadPool;
 pub use pcm::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};

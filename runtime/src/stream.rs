@@ -5,7 +5,7 @@ use crate::adapters::SplitOutput;
 use crate::adapters::{Input, Interleaved, Output, WithoutOffsets, Zeros};
 use crate::engine::Engine;
 use crate::state::{Count, Header, Numbers};
-use crate::{Plan, ProcessError, Sample, Shape, StateError, SwapError};
+use crate::{Plan, ProcessError, Sample, StateError};
 
 /// Filters the frames of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0 before the
 /// first frame, and x_i the samples without the [offsets](Plan::with_offsets) of their converters.
@@ -147,32 +147,6 @@ impl Stream {
         Ok(frames * self.ratio())
     }
 
-    /// Makes this stream, whatever it was, the continuation of `running` by its own plan, at the same frame
-    /// and with the same counts. Does not allocate: make the new stream on another thread, and call this at
-    /// a frame boundary on the thread that runs.
-    ///
-    /// Samples of the past stay as they are: the offsets of the new plan hold for the frames to come.
-    ///
-    /// For direct plans of one number type only. The outputs are those that the new plan would have given
-    /// from the beginning, bit for bit: at once if the [history](Plan::history) of the new plan is no longer
-    /// than that of the old one, else as many frames later as the new one looks back. What the old plan had
-    /// forgotten counts as 0 in between.
-    ///
-    /// # Errors
-    /// [`SwapError`]; the stream is as before then.
-    pub fn continue_from(&mut self, running: &Self) -> Result<(), SwapError> {
-        let ([from, to], [old, new]) = ([running, self].map(Self::shape), [&running.plan, &self.plan]);
-        if from != to {
-            return Err(SwapError::Shape { from, to });
-        }
-        let [from, to] = [old, new].map(|plan| plan.algorithm());
-        if !self.engine.continue_from(&running.engine) {
-            return Err(SwapError::State { from, to });
-        }
-        (self.position, self.replaced) = (running.position, running.replaced);
-        Ok(())
-    }
-
     /// The state as bytes, from which [`Stream::resume`] goes on, in this process or another one, on any
     /// processor. Allocates them; [`Stream::save`] need not.
     pub fn state(&self) -> Vec<u8> {
@@ -234,9 +208,5 @@ impl Stream {
             return Err(ProcessError::OutputTooShort { given: output.capacity(), wanted });
         }
         Ok(frames)
-    }
-
-    fn shape(&self) -> Shape {
-        Shape { channels: self.channels(), ratio: self.ratio() }
     }
 }

@@ -151,14 +151,3 @@ fn samples_that_are_not_finite_or_overflow() {
         }
     }
 }
-
-#[test]
-fn going_on_by_another_plan() {
-    let (old, new) = (plans(), plans());
-    for (old, new) in old.iter().zip(&new).filter(|(old, _)| old.algorithm() == "direct") {
-        let (mut running, mut next) = (Stream::new(old), Stream::new(new));
-        running.process(&vec![0.5f32; 77 * old.channels()], &mut vec![0.0; 77 * M]).unwrap();
-        quiet(new, "continuation", || next.continue_from(&running)).unwrap();
-        assert_eq!(next.position(), 77);
-    }
-}

@@ -18,11 +18,6 @@ pub struct HalfPowerBand {
 }
 
 impl StableFilter {
-    /// The upper edge of [`Self::half_power_band`].
-    pub fn half_power_frequency(&self) -> RadiansPerFastPeriod {
-        self.half_power_band().high
-    }
-
     /// The band within 3 dB of the largest gain.
     pub fn half_power_band(&self) -> HalfPowerBand {
         let gain = |w: f64| self.response(RadiansPerFastPeriod(w)).norm();
@@ -73,7 +68,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     fn upper_edge(filter: &FilterSpec) -> f64 {
-        StrictlyProper::new(filter, Seconds(1.0)).unwrap().half_power_frequency().0
+        StrictlyProper::new(filter, Seconds(1.0)).unwrap().half_power_band().high.0
     }
 
     #[test]

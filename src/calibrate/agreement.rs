@@ -63,9 +63,26 @@ pub enum Verdict {
     /// There is one channel, or there are too many.
     #[error("captures are compared with the spec for 2 to {MOST_CHANNELS} channels")]
     Channels,
+    /// They cannot be compared.
+    #[error(transparent)]
+    Incomparable(Incomparable),
+    /// Nothing compared them.
+    #[error("the captures were not compared with the spec")]
+    Unjudged,
+}
+
+impl From<Verdict> for Agreement {
+    fn from(verdict: Verdict) -> Self {
+        Self { contradictions: Vec::new(), verdict }
+    }
 }
 
 impl Agreement {
+    /// In what the captures contradict the spec, in words.
+    pub fn warnings(&self) -> Vec<String> {
+        self.contradictions.iter().map(ToString::to_string).collect()
+    }
+
     /// Whether the captures agree with the spec of a bank, in a line.
     pub fn summary(&self) -> String {
         match self.contradictions.len() {
@@ -117,10 +134,9 @@ pub fn frames_for_agreement(channels: usize) -> usize {
 /// is a contradiction.
 pub fn agreement(spec: &Spec, records: &[Record]) -> Agreement {
     let contradicted = |contradictions| Agreement { contradictions, verdict: Verdict::Undecided };
-    let nothing = |verdict| Agreement { contradictions: Vec::new(), verdict };
     let channels = spec.channels.len();
     if records.len() != channels || !(2..=MOST_CHANNELS).contains(&channels) {
-        return nothing(Verdict::Channels);
+        return Agreement::from(Verdict::Channels);
     }
     let delays = spec.delays();
     let is_one = |i: usize, j: usize| delays[i].periods_since(delays[j], spec.ratio) == Some(0.0);
@@ -129,17 +145,17 @@ pub fn agreement(spec: &Spec, records: &[Record]) -> Agreement {
     }
     let shortest = records.iter().map(|record| record.samples.len()).min().unwrap_or(0);
     if shortest < LEAST_FRAMES {
-        return nothing(Verdict::Short);
+        return Agreement::from(Verdict::Short);
     }
     let levels: Vec<f64> = records.iter().map(Record::rms).collect();
     if levels.iter().all(|level| *level == 0.0) {
-        return nothing(Verdict::NoSignal);
+        return Agreement::from(Verdict::NoSignal);
     }
     let without_signal = without_signal(spec, &levels);
     if !without_signal.is_empty() {
         return contradicted(without_signal);
     }
-    let Ok(model) = Model::new(spec) else { return nothing(Verdict::Undecided) };
+    let Ok(model) = Model::new(spec) else { return Agreement::from(Verdict::Undecided) };
     let beginning: Vec<Record> = records.iter().map(|record| record.part(0..ENOUGH_FRAMES)).collect();
     let delays = delays_told(spec, &model, &beginning);
     if delays.contradictions.iter().any(|found| matches!(found, Contradiction::WrongOrder { .. })) {

@@ -43,7 +43,7 @@ impl Captures {
             std::iter::repeat_n(header.rails, part.channels)
         });
         let rails = rails.step_by(if is_complex { 2 } else { 1 });
-        let channels = OfflineSamples::of_frames(frames).channels;
+        let channels = OfflineSamples::of_frames(frames, usize::MAX).channels;
         let channels = with_rails(channels, is_complex, rails);
         Self { name: "the captures".into(), channels, rate: None, is_cut: false }
     }

@@ -33,9 +33,9 @@ pub enum DesignError {
     Linalg(#[from] LinalgError),
     /// No certificate was found at any gamma that was tried: up to 10 % above the computed norm in general.
     #[error(
-        "the computed gamma could not be proven: no certificate passes at any gamma that was tried, {}{}; the front ends may be too \
-         stiff or the channels too nearly equal",
-        certificate_digits(*.states), failure_text(.failure.as_deref())
+        "the computed gamma could not be proven: for an error system of {states} states no certificate passes at any gamma that \
+         was tried (in 512 bits up to {MAX_LONG_STATES} states){}; the front ends may be too stiff or the channels too nearly equal",
+        failure_text(.failure.as_deref())
     )]
     NotCertified {
         /// States of the error system.
@@ -69,19 +69,9 @@ pub enum DesignError {
     /// The proof that was found does not prove the gammas.
     #[error(transparent)]
     Verify(#[from] VerifyError),
-    /// At the requested scale all taps round to zero.
+    /// At the requested scale the integers that fit their bits are zero, or so small that they do nothing.
     #[error(
-        "with fraction_bits = {fraction_bits} all integer taps are zero: the taps fit their bits up to fraction_bits = {fitting}; give about that, or leave it out"
-    )]
-    AllZero {
-        /// The scale.
-        fraction_bits: i32,
-        /// The finest scale at which no tap is clipped.
-        fitting: i32,
-    },
-    /// At the requested scale the integers that fit their bits are so small that they do nothing.
-    #[error(
-        "with fraction_bits = {fraction_bits} the integer taps are too small to do better than zero output: the taps fit their bits up to fraction_bits = {fitting}; give about that, or leave it out"
+        "with fraction_bits = {fraction_bits} the integer taps are zero, or too small to do better than zero output: the taps fit their bits up to fraction_bits = {fitting}; give about that, or leave it out"
     )]
     TinyTaps {
         /// The scale.
@@ -215,9 +205,10 @@ pub enum DesignError {
     },
     /// No Riccati equation could be solved, not even at the largest gamma.
     #[error(
-        "no filters were found: the Riccati equation of {states} states could not be solved {}, in double precision{}; try \
-         method = \"fir\", a shorter latency, or move nearly equal delays apart",
-        level_text(*.gamma), digits_text(*.states)
+        "no filters were found: the Riccati equation of {states} states could not be solved {} (in 106 bits up to \
+         {MOST_STATES_AT_106_BITS} states, in 512 up to {MOST_STATES_AT_512_BITS}); try method = \"fir\", a shorter latency, or move \
+         nearly equal delays apart",
+        level_text(*.gamma)
     )]
     RiccatiFailed {
         /// The largest gamma tried; `None` for the mean-square optimum.
@@ -231,25 +222,6 @@ fn level_text(gamma: Option<f64>) -> String {
     gamma.map_or_else(|| "for the least mean square".to_owned(), |gamma| format!("at gamma = {gamma}"))
 }
 
-/// The precisions beyond doubles in which the Riccati equation of so many states is tried.
-fn digits_text(states: usize) -> String {
-    match states {
-        _ if states <= MOST_STATES_AT_512_BITS => ", 106 or 512 bits".to_owned(),
-        _ if states <= MOST_STATES_AT_106_BITS => {
-            format!(" or 106 bits (512 bits are tried up to {MOST_STATES_AT_512_BITS} states)")
-        }
-        _ => format!(" (more digits are tried up to {MOST_STATES_AT_106_BITS} states)"),
-    }
-}
-
-/// The precisions in which the certificate of an error system of so many states is searched.
-fn certificate_digits(states: usize) -> String {
-    if states <= MAX_LONG_STATES {
-        return "neither in double precision nor in 512 bits".to_owned();
-    }
-    format!("in double precision (512 bits are tried up to {MAX_LONG_STATES} states, these are {states})")
-}
-
 fn failure_text(failure: Option<&DesignError>) -> String {
     failure.map_or_else(String::new, |failure| format!(" ({failure})"))
 }
@@ -258,19 +230,10 @@ fn failure_text(failure: Option<&DesignError>) -> String {
 mod tests {
     use super::*;
 
-    /// The message of many states said that the precision had not been enough, though 512 bits were not
-    /// tried; that of the mean square said "gamma = inf".
     #[test]
-    fn messages_say_what_was_tried() {
-        let unproven = |states: usize| DesignError::NotCertified { states, failure: None }.to_string();
-        assert!(unproven(MAX_LONG_STATES).contains("neither in double precision nor in 512 bits"));
-        assert!(unproven(MAX_LONG_STATES + 1).contains("512 bits are tried up to 96 states, these are 97"));
-        let failed = |gamma: Option<f64>, states: usize| DesignError::RiccatiFailed { gamma, states };
-        let mean_square = failed(None, MOST_STATES_AT_106_BITS + 1).to_string();
-        assert!(!mean_square.contains("inf"), "{mean_square}");
-        assert!(mean_square.contains("more digits are tried up to 96 states"), "{mean_square}");
-        assert!(
-            failed(Some(0.5), 3).to_string().contains("at gamma = 0.5, in double precision, 106 or 512 bits")
-        );
+    fn the_mean_square_is_no_level_of_gamma() {
+        let failed = |gamma: Option<f64>| DesignError::RiccatiFailed { gamma, states: 3 }.to_string();
+        assert!(failed(None).contains("for the least mean square"));
+        assert!(failed(Some(0.5)).contains("at gamma = 0.5"));
     }
 }

@@ -10,7 +10,6 @@ use super::plant::LiftedPlant;
 use crate::linalg::{self, CMat, Mat};
 use crate::lmi::sampled::{Point, Taps};
 use crate::lti::peak::{Peak, local_maxima, refine};
-use std::cell::OnceCell;
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
@@ -19,7 +18,7 @@ const POINTS_PER_LAG: usize = 3;
 /// Least number of these intervals: front ends have a memory, too.
 const LEAST_POINTS: usize = 24;
 /// The grid for peaks is finer by this factor.
-pub(super) const FINE: usize = 8;
+const FINE: usize = 8;
 /// Where a level is given, every so many points are looked at first: six for each slow lag. Between two of
 /// them, pi / (6 lags) apart, the gain falls from a maximum by 1 % at most (M. Riesz: cos(lags t / 2) with
 /// t = pi / (12 lags)), and the memory of the front ends adds some.
@@ -44,9 +43,9 @@ pub(super) trait AffineError {
     /// W and H at a location.
     fn at(&self, location: &Location<Self::Scenario>) -> Point;
 
-    /// The peaks of `sigma_max(K)` for the unknowns `taps`, whose largest value at the points is `gamma`.
-    /// Peaks up to `level` may be left out.
-    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<Self::Scenario>, DesignError>;
+    /// The local maxima of `sigma_max(K)` over the frequencies for the unknowns `taps`, in any order. Those
+    /// up to `level` may be left out.
+    fn peaks(&self, taps: &Taps, level: f64) -> Result<Vec<LocatedPeak<Self::Scenario>>, DesignError>;
 }
 
 /// A frequency in one of the scenarios.
@@ -70,24 +69,14 @@ pub(super) struct LocatedPeak<S> {
     pub(super) location: Location<S>,
 }
 
-/// Local maxima of `sigma_max(K)` over the frequencies.
-#[derive(Debug, Clone)]
-pub(super) struct Peaks<S> {
-    /// Estimate of gamma; equal to gamma if no peak was missed.
-    pub(super) estimate: f64,
-    /// The peaks, in any order.
-    pub(super) peaks: Vec<LocatedPeak<S>>,
-}
-
-impl<S: Clone> Peaks<S> {
-    /// The locations of the peaks above `level`.
-    pub(super) fn above(&self, level: f64) -> Vec<Location<S>> {
-        self.peaks.iter().filter(|peak| peak.gain > level).map(|peak| peak.location.clone()).collect()
+impl From<Peak> for LocatedPeak<()> {
+    fn from(Peak { gain, frequency }: Peak) -> Self {
+        Self { gain, location: Location { frequency, scenario: () } }
     }
 }
 
 /// Intervals of the grid for mean squares, for filters of `lags` slow lags.
-pub(super) fn coarse_intervals(lags: usize) -> usize {
+fn coarse_intervals(lags: usize) -> usize {
     LEAST_POINTS.max(POINTS_PER_LAG * lags)
 }
 
@@ -130,19 +119,13 @@ impl Frequencies {
     }
 }
 
-/// Taps with their responses on the grid, computed when they are needed.
-struct GridResponse<'t> {
-    taps: &'t [Mat],
-    values: Vec<OnceCell<CMat>>,
-}
-
 impl<'a> ErrorGrid<'a> {
     /// The error of `plant`, for filters of `lags` slow lags.
     ///
     /// # Errors
     /// [`DesignError::Lti`] if the plant is not stable.
     pub(super) fn new(plant: &'a LiftedPlant, lags: usize) -> Result<Self, DesignError> {
-        let frequencies = Frequencies::new(lags, plant.resonances()?);
+        let frequencies = Frequencies::new(lags, &plant.resonances()?);
         let points = vec![OnceLock::new(); frequencies.all.len()];
         Ok(Self { plant, frequencies, points })
     }
@@ -163,14 +146,14 @@ impl<'a> ErrorGrid<'a> {
 
     /// The gain of the error with `taps` at each point.
     pub(super) fn gains(&self, taps: &[Mat]) -> Result<Vec<f64>, DesignError> {
-        self.gains_about(&self.response(taps), 0.0)
+        (0..self.frequencies.all.len()).map(|k| gain(&self.error(k, taps))).collect()
     }
 
     /// The mean square of the error per slow period, for white noise of unit density at the analog input, by
     /// the trapezoidal rule on the equidistant frequencies.
     pub(super) fn mean_square(&self, taps: &[Mat]) -> f64 {
-        let (response, weights) = (self.response(taps), self.mean_weights());
-        let square = |k: usize| weights[k] * self.error(k, &response).norm_squared();
+        let weights = self.mean_weights();
+        let square = |k: usize| weights[k] * self.error(k, taps).norm_squared();
         self.frequencies.uniform.iter().map(|&k| square(k)).sum()
     }
 
@@ -185,62 +168,27 @@ impl<'a> ErrorGrid<'a> {
         weights
     }
 
-    /// The peaks of the error with `taps` above `level`. The estimate is that of gamma if gamma is above the
-    /// level; else it is at most the level.
-    pub(super) fn peaks(&self, taps: &[Mat], level: f64) -> Result<Peaks<()>, DesignError> {
-        let maxima = self.maxima(taps, level)?;
-        let estimate = maxima.iter().map(|peak| peak.gain).fold(0.0, f64::max);
-        let above = maxima.into_iter().filter(|peak| peak.gain > level);
-        let located = |Peak { gain, frequency }: Peak| LocatedPeak {
-            gain,
-            location: Location { frequency, scenario: () },
-        };
-        Ok(Peaks { estimate, peaks: above.map(located).collect() })
+    /// An estimate of the gamma of `taps`: the largest of the maxima.
+    ///
+    /// # Errors
+    /// [`DesignError::Linalg`] if a decomposition does not converge.
+    pub(super) fn gamma(&self, taps: &[Mat]) -> Result<f64, DesignError> {
+        Ok(self.maxima(taps)?.iter().map(|peak| peak.gain).fold(0.0, f64::max))
     }
 
-    /// The local maxima above a share of `level`.
-    fn maxima(&self, taps: &[Mat], level: f64) -> Result<Vec<Peak>, DesignError> {
-        let gains = self.gains_about(&self.response(taps), level)?;
-        let grid: Vec<Peak> = gains
-            .into_iter()
-            .zip(&self.frequencies.all)
-            .map(|(gain, &frequency)| Peak { gain, frequency })
-            .collect();
+    /// The local maxima of the error with `taps`.
+    fn maxima(&self, taps: &[Mat]) -> Result<Vec<Peak>, DesignError> {
+        let grid = self.gains(taps)?.into_iter().zip(&self.frequencies.all);
+        let grid: Vec<Peak> = grid.map(|(gain, &frequency)| Peak { gain, frequency }).collect();
         let at = |frequency: f64| {
             let error = self.plant.at(frequency).error(&filters::response(taps, frequency));
             Ok(Peak { gain: gain(&error)?, frequency })
         };
-        let maxima = local_maxima(&grid).into_iter().filter(|[_, peak, _]| peak.gain >= PRUNE_LEVEL * level);
-        maxima.map(|around| refine(at, around, FLAT_GAIN)).collect()
+        local_maxima(&grid).into_iter().map(|around| refine(at, around, FLAT_GAIN)).collect()
     }
 
-    /// The gains near points with gains about `level` or more; elsewhere smaller numbers.
-    fn gains_about(&self, taps: &GridResponse<'_>, level: f64) -> Result<Vec<f64>, DesignError> {
-        let mut gains = vec![0.0; self.frequencies.all.len()];
-        for &k in &self.frequencies.first {
-            let error = self.error(k, taps);
-            // The Frobenius norm is no smaller than the gain and costs less.
-            let bound = error.norm();
-            gains[k] = if bound < PRUNE_LEVEL * level { bound } else { gain(&error)? };
-        }
-        for pair in self.frequencies.first.windows(2) {
-            if gains[pair[0]].max(gains[pair[1]]) >= PRUNE_LEVEL * level {
-                let between = pair[0] + 1..pair[1];
-                for (k, known) in between.clone().zip(&mut gains[between]) {
-                    *known = gain(&self.error(k, taps))?;
-                }
-            }
-        }
-        Ok(gains)
-    }
-
-    fn response<'t>(&self, taps: &'t [Mat]) -> GridResponse<'t> {
-        GridResponse { taps, values: vec![OnceCell::new(); self.frequencies.all.len()] }
-    }
-
-    fn error(&self, k: usize, taps: &GridResponse<'_>) -> CMat {
-        let response = taps.values[k].get_or_init(|| filters::response(taps.taps, self.frequencies.all[k]));
-        self.point(k).error(response)
+    fn error(&self, k: usize, taps: &[Mat]) -> CMat {
+        self.point(k).error(&filters::response(taps, self.frequencies.all[k]))
     }
 
     fn point(&self, k: usize) -> &Point {
@@ -255,10 +203,9 @@ impl AffineError for ErrorGrid<'_> {
         self.plant.at(location.frequency)
     }
 
-    fn peaks(&self, taps: &Taps, gamma: f64, _level: f64) -> Result<Peaks<()>, DesignError> {
-        // The estimate is compared with the norm, so it has to be one below the level too.
-        let found = self.peaks(taps, 0.0)?;
-        Ok(Peaks { estimate: found.estimate.max(gamma), ..found })
+    /// All of them: the largest is compared with the norm, so it has to be one below the level too.
+    fn peaks(&self, taps: &Taps, _level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
+        Ok(self.maxima(taps)?.into_iter().map(LocatedPeak::from).collect())
     }
 }
 

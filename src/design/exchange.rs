@@ -21,11 +21,11 @@
 //! exchange methods.
 
 use super::DesignError;
-use super::error_grid::{AffineError, Location, Peaks};
+use super::error_grid::{AffineError, Location};
 use super::limits::Stop;
 use crate::linalg;
-use crate::lmi::sampled::{self, Covered, LowerBound, MeanSquareObjective, Point, Problem, Taps};
-use crate::lmi::{FINEST_GAP, Outcome};
+use crate::lmi::FINEST_GAP;
+use crate::lmi::sampled::{self, LowerBound, MeanSquareObjective, Point, Problem, Taps};
 
 /// Relative width of the interval `[lower, gamma]` at which the exchange ends.
 pub(crate) const GAMMA_ACCURACY: f64 = 5e-7;
@@ -81,34 +81,36 @@ impl Tolerances {
     }
 }
 
-/// Unknowns with the peaks of their error.
+/// Unknowns with what their error peaks at.
 #[derive(Debug, Clone)]
 pub(super) struct Candidate<S> {
     /// `F_j`, M x N.
     pub(super) taps: Taps,
-    /// The peaks of the error.
-    pub(super) peaks: Peaks<S>,
+    /// Estimate of their gamma; equal to gamma if no peak was missed.
+    pub(super) estimate: f64,
+    /// The locations of the peaks that belong among the points.
+    above: Vec<Location<S>>,
 }
 
 /// The solution on the points.
 struct Round<S> {
     candidate: Candidate<S>,
-    /// The locations of the peaks that belong among the points.
-    above: Vec<Location<S>>,
-    outcome: Outcome,
+    is_solved: bool,
 }
 
 /// The state of the exchange: the points so far and the lower bound that they give.
 #[derive(Debug)]
 pub(super) struct Exchange<E: AffineError> {
-    error: E,
+    /// The error that is minimised. The points stay when its scenarios are refined, so known ones must not
+    /// change.
+    pub(super) error: E,
     problem: Problem,
-    /// Of the points of the problem.
-    locations: Vec<Location<E::Scenario>>,
+    /// Of the points of the problem, in the order in which they were added.
+    pub(super) locations: Vec<Location<E::Scenario>>,
     /// Added points have the weight zero.
     objective: MeanSquareObjective,
     gamma_margin: f64,
-    /// Lower bound on gamma for all unknowns, or for those of any size that matters ([`Covered`]).
+    /// Lower bound on gamma for all unknowns, or for those of any size that matters ([`LowerBound`]).
     pub(super) lower: f64,
     /// The largest lower bound for all unknowns, however large.
     pub(super) lower_for_all: f64,
@@ -148,21 +150,6 @@ impl<E: AffineError> Exchange<E> {
             rounds: 0,
             iterations: 0,
         }
-    }
-
-    /// The error that is minimised.
-    pub(super) fn error(&self) -> &E {
-        &self.error
-    }
-
-    /// The same, to refine its scenarios. The points stay, so those of known scenarios must not change.
-    pub(super) fn error_mut(&mut self) -> &mut E {
-        &mut self.error
-    }
-
-    /// The locations of all points, in the order in which they were added.
-    pub(super) fn locations(&self) -> &[Location<E::Scenario>] {
-        &self.locations
     }
 
     /// Unknowns with gamma within the margin of the optimum and the least secondary objective.
@@ -206,20 +193,20 @@ impl<E: AffineError> Exchange<E> {
         let mut last = self.round(tolerances, tolerance)?;
         let mut best = last.candidate.clone();
         for _ in 1..tolerances.rounds {
-            let gamma = best.peaks.estimate;
+            let gamma = best.estimate;
             if gamma <= self.lower * (1.0 + tolerances.accuracy) || self.stop.is_due() {
                 break;
             }
             // Without a peak to add it is the problem on the points that is not solved closely enough. If
             // it cannot be, that is the end.
-            let added = self.add(&last.above);
-            if !added && (last.outcome != Outcome::Solved || tolerance <= tolerances.finest()) {
+            let added = self.add(&last.candidate.above);
+            if !added && (!last.is_solved || tolerance <= tolerances.finest()) {
                 break;
             }
             tolerance = tolerances.tolerance(if added { gamma / self.lower - 1.0 } else { 0.0 });
             last = self.round(tolerances, tolerance)?;
             // Once the design is stopped, the estimate of the new taps is that of the points alone.
-            if !self.stop.is_due() && last.candidate.peaks.estimate < best.peaks.estimate {
+            if !self.stop.is_due() && last.candidate.estimate < best.estimate {
                 best = last.candidate.clone();
             }
         }
@@ -235,8 +222,7 @@ impl<E: AffineError> Exchange<E> {
         let optimum = if tolerance > tolerances.finest() { self.lower } else { solution.gamma };
         let level = optimum * (1.0 + PEAK_EXCESS * tolerances.accuracy);
         let candidate = self.judge(solution.taps, solution.gamma, level)?;
-        let above = candidate.peaks.above(level);
-        Ok(Round { candidate, above, outcome: solution.outcome })
+        Ok(Round { candidate, is_solved: solution.is_solved })
     }
 
     /// Leaves out the added points where the gain of `start` is below a share of its gamma. If the secondary
@@ -245,7 +231,7 @@ impl<E: AffineError> Exchange<E> {
         if share == 0.0 {
             return Ok(());
         }
-        let least = share * start.peaks.estimate;
+        let least = share * start.estimate;
         let (mut points, mut weights, mut locations) = (Vec::new(), Vec::new(), Vec::new());
         for (l, point) in self.problem.points().iter().enumerate() {
             let weight = self.objective.weights[l];
@@ -269,8 +255,8 @@ impl<E: AffineError> Exchange<E> {
         start: Candidate<E::Scenario>,
         tolerances: Tolerances,
     ) -> Result<Candidate<E::Scenario>, DesignError> {
-        let cap = start.peaks.estimate * (1.0 + self.gamma_margin);
-        let cap_at_points = start.peaks.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
+        let cap = start.estimate * (1.0 + self.gamma_margin);
+        let cap_at_points = start.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
         for _ in 0..tolerances.rounds {
             if self.stop.is_due() {
                 return Ok(start);
@@ -287,10 +273,10 @@ impl<E: AffineError> Exchange<E> {
             let Some(found) = found else { return Ok(start) };
             self.count_round(found.iterations);
             let candidate = self.judge(found.taps, found.gamma, cap_at_points)?;
-            if candidate.peaks.estimate <= cap {
+            if candidate.estimate <= cap {
                 return Ok(candidate);
             }
-            if !self.add(&candidate.peaks.above(cap_at_points)) {
+            if !self.add(&candidate.above) {
                 break;
             }
         }
@@ -300,15 +286,14 @@ impl<E: AffineError> Exchange<E> {
     /// The taps with the peaks of their error. None is searched once the design is stopped: `gamma`, that of
     /// the points, stands for them.
     fn judge(&self, taps: Taps, gamma: f64, level: f64) -> Result<Candidate<E::Scenario>, DesignError> {
-        let peaks = match self.stop.is_due() {
-            true => Peaks { estimate: gamma, peaks: Vec::new() },
-            false => self.error.peaks(&taps, gamma, level)?,
-        };
-        Ok(Candidate { taps, peaks })
+        let peaks = if self.stop.is_due() { Vec::new() } else { self.error.peaks(&taps, level)? };
+        let estimate = peaks.iter().map(|peak| peak.gain).fold(gamma, f64::max);
+        let above = peaks.into_iter().filter(|peak| peak.gain > level).map(|peak| peak.location).collect();
+        Ok(Candidate { taps, estimate, above })
     }
 
     fn raise_lower_bound(&mut self, lower: LowerBound) {
-        if lower.covered == Covered::All {
+        if lower.covers_all {
             self.lower_for_all = self.lower_for_all.max(lower.value);
         }
         self.lower = self.lower.max(lower.value);

@@ -46,15 +46,15 @@ impl FilterResponse {
     /// Fewest and most of these angles.
     const BREAKS: std::ops::RangeInclusive<f64> = 4.0..=512.0;
 
-    /// Of the filters of `bank`.
+    /// Of the filters of a bank.
     ///
     /// # Errors
     /// [`DesignError::Lti`] for unstable filters.
-    pub(crate) fn new(bank: &Bank) -> Result<Self, DesignError> {
-        Ok(match &bank.filters {
-            SynthesisFilters::Fir(taps) => Self::Polynomial(polyphase(taps, bank.ratio)),
-            block @ SynthesisFilters::StateSpace(_) => {
-                let system = lifted(block, bank.ratio);
+    pub(crate) fn new(filters: &SynthesisFilters, ratio: usize) -> Result<Self, DesignError> {
+        Ok(match filters {
+            SynthesisFilters::Fir(taps) => Self::Polynomial(polyphase(taps, ratio)),
+            SynthesisFilters::StateSpace(_) => {
+                let system = lifted(filters, ratio);
                 let resonances = resonances(&stable_poles(&system)?);
                 Self::Recursive { response: FrequencyResponse::new(&system), resonances }
             }

@@ -60,21 +60,13 @@ const FAINT_NORM_ACCURACY: f64 = 0.1;
 pub struct LiftedPlant {
     problem: Problem,
     lifted: Lifted,
-    cache: Cache,
-}
-
-/// What several judgements of one plant need.
-#[derive(Debug, Clone, Default)]
-struct Cache {
     response: OnceLock<FrequencyResponse>,
-    resonances: OnceLock<Vec<f64>>,
-    measurement_size: OnceLock<f64>,
 }
 
 impl LiftedPlant {
     /// The exactly equivalent plant of `problem`.
     pub fn new(problem: &Problem) -> Self {
-        Self { problem: problem.clone(), lifted: lift(problem), cache: Cache::default() }
+        Self { problem: problem.clone(), lifted: lift(problem), response: OnceLock::new() }
     }
 
     /// The same plant with the noise of the converters: each channel that has noise gets an input of unit
@@ -109,7 +101,7 @@ impl LiftedPlant {
             undelayed: added(&self.lifted.undelayed),
             delays: self.lifted.delays.clone(),
         };
-        Self { problem: self.problem.clone(), lifted, cache: Cache::default() }
+        Self { problem: self.problem.clone(), lifted, response: OnceLock::new() }
     }
 
     /// The problem in normalised time from which the plant was made.
@@ -205,7 +197,7 @@ impl LiftedPlant {
         };
         // Between 0 and pi a polynomial in e^{-jw} has at most one peak per lag.
         let grid = FREQUENCIES_PER_LAG * lags.len();
-        let mut initial = self.resonances()?.to_vec();
+        let mut initial = self.resonances()?;
         initial.extend((1..grid).map(|k| PI * k as f64 / grid as f64));
         Ok(hinf_norm_with_response(&system, &response, initial)?)
     }
@@ -240,8 +232,10 @@ impl LiftedPlant {
     /// # Errors
     /// [`DesignError::Lti`] if the plant or `filters` are not stable.
     pub fn rounding(&self, filters: &StateSpace) -> Result<f64, DesignError> {
-        let inverse: Vec<f64> = self.problem.measurement_units()?.iter().map(|unit| 1.0 / unit).collect();
-        Ok(f64::EPSILON * h2_norm(&filters.scale_inputs(&inverse))? * self.measurement_size()?)
+        let units = self.problem.measurement_units()?;
+        let inverse: Vec<f64> = units.iter().map(|unit| 1.0 / unit).collect();
+        let measurement = h2_norm(&self.measurement().scale_outputs(&units))?;
+        Ok(f64::EPSILON * h2_norm(&filters.scale_inputs(&inverse))? * measurement)
     }
 
     /// The absolute error that the computed `norm` of the error system of `filters` may have.
@@ -260,18 +254,6 @@ impl LiftedPlant {
     pub fn accuracy(&self, norm: f64) -> Result<f64, DesignError> {
         let is_faint = norm < FAINT_NORM * hinf_norm(&self.reference())?.gain;
         Ok(if is_faint { FAINT_NORM_ACCURACY } else { Gamma::NORM_ACCURACY })
-    }
-
-    /// ||H||_2 of measurements of about unit size.
-    fn measurement_size(&self) -> Result<f64, DesignError> {
-        match self.cache.measurement_size.get() {
-            Some(&size) => Ok(size),
-            None => {
-                let units = self.problem.measurement_units()?;
-                let size = h2_norm(&self.measurement().scale_outputs(&units))?;
-                Ok(*self.cache.measurement_size.get_or_init(|| size))
-            }
-        }
     }
 
     /// The part of the references that no filter can estimate from the measurements: max over omega of
@@ -296,7 +278,7 @@ impl LiftedPlant {
     /// `[H; W]` at e^{j omega}. A delay by whole periods is a factor of its row, so the time does not depend
     /// on the length of the delay chains.
     pub(super) fn at_frequency(&self, omega: f64) -> CMat {
-        let undelayed = self.cache.response.get_or_init(|| FrequencyResponse::new(&self.lifted.undelayed));
+        let undelayed = self.response.get_or_init(|| FrequencyResponse::new(&self.lifted.undelayed));
         let mut g = undelayed.at_frequency(omega);
         for (mut row, &delay) in g.row_iter_mut().zip(&self.lifted.delays).filter(|(_, delay)| **delay > 0) {
             row *= Complex::from_polar(1.0, -omega * delay as f64);
@@ -306,12 +288,8 @@ impl LiftedPlant {
 
     /// The frequencies near the poles of the plant. Apart from poles at zero, every FIR error system has
     /// these poles.
-    pub(super) fn resonances(&self) -> Result<&[f64], DesignError> {
-        if self.cache.resonances.get().is_none() {
-            let found = resonances(&stable_poles(&self.lifted.undelayed)?);
-            return Ok(self.cache.resonances.get_or_init(|| found));
-        }
-        Ok(self.cache.resonances.get().map_or(&[], Vec::as_slice))
+    pub(super) fn resonances(&self) -> Result<Vec<f64>, DesignError> {
+        Ok(resonances(&stable_poles(&self.lifted.undelayed)?))
     }
 }
 

@@ -4,7 +4,7 @@
 
 use super::limits::Stop;
 use super::merging::{MergedChannels, Repeats};
-use super::methods::{Filters, Synthesis};
+use super::methods::Synthesis;
 use super::plant::LiftedPlant;
 use super::problem::Problem;
 use super::quantise::{Allowance, QuantisationProblem, WordStudy, quantise, quantise_within};
@@ -52,8 +52,8 @@ pub(super) fn realise(
     let whole = if merged.are_unchanged() { merged_plant.clone() } else { LiftedPlant::new(problem) };
     let realisation = Realisation { spec, problem, whole: &whole, merged, stop };
     let realised = match &synthesis.filters {
-        Filters::Fir(taps) => realisation.with_integers(realisation.fir(taps, synthesis.peak)?),
-        Filters::StateSpace(system) => realisation.state_space(system, synthesis.peak.gain),
+        SynthesisFilters::Fir(taps) => realisation.with_integers(realisation.fir(taps, synthesis.peak)?),
+        recursion => realisation.state_space(&filters::lifted(recursion, spec.ratio), synthesis.peak.gain),
     }?;
     let lifted = filters::lifted(&realised.filters, spec.ratio);
     let norm_error = whole.norm_error(realised.peak.gain, &lifted)?;

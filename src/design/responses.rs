@@ -114,7 +114,7 @@ pub fn error_response(bank: &Bank, points: usize) -> Result<Vec<(Hertz, f64)>, D
     let problem = Problem::of_bank(bank)?;
     problem.check_size()?;
     let plant = LiftedPlant::new(&problem);
-    let filters = filters::FilterResponse::new(bank)?;
+    let filters = filters::FilterResponse::new(&bank.filters, bank.ratio)?;
     let step = PI / points.saturating_sub(1).max(1) as f64;
     let at = |k: usize| {
         let omega = step * k as f64;

@@ -12,13 +12,13 @@ use super::filters;
 use super::least_errors::{LeastErrors, candidates, check_reach, is_almost, manageable, shortest};
 use super::limits::Stop;
 use super::merging::Repeats;
-use super::methods::robust_fir::RobustProblem;
-use super::methods::{self, Deviations, Filters, Settings};
+use super::methods::robust_fir::robust_box;
+use super::methods::{self, Deviations, Settings};
 use super::plant::LiftedPlant;
 use super::problem::{Problem, common_delay};
 use super::realise::realise;
 use crate::analog::SignalFilter;
-use crate::lti::StateSpace;
+use crate::bank::SynthesisFilters;
 use crate::lti::gramian::h2_norm;
 use crate::spec::{MAX_ERROR_STATES, MAX_OPTIMISED_TAPS, Method, Spec};
 use crate::units::Seconds;
@@ -169,7 +169,7 @@ fn choose(
             Choice { taps: 0, latency }
         }
     };
-    let is_minimax = spec.design.method == Method::Fir && RobustProblem::of(spec).is_none();
+    let is_minimax = spec.design.method == Method::Fir && robust_box(spec).is_none();
     if let Some(wanted) = wanted.filter(|_| is_minimax) {
         chosen = lengthened(spec, &merged, chosen, wanted, comparison)?;
     }
@@ -265,8 +265,7 @@ fn error_of_order(spec: &Spec, problem: &Problem, stop: &Stop) -> Result<f64, De
     let settings = Settings { stop: stop.clone(), ..settings(&spec, 0)? };
     let synthesis = methods::synthesise(Method::H2, &plant, &settings)?;
     let realised = realise(&spec, problem, &merged, &plant, &synthesis, stop)?;
-    let system = filters::lifted(&realised.filters, problem.ratio);
-    whole_error(&LiftedPlant::new(problem), &Filters::StateSpace(system))
+    whole_error(&LiftedPlant::new(problem), &realised.filters)
 }
 
 /// The fewest taps per channel whose least error reaches the SNR that `spec` asks for, or which is within
@@ -367,8 +366,8 @@ pub(super) fn settings(spec: &Spec, taps: usize) -> Result<Settings, DesignError
     let separate = spec.design.method == Method::Separation;
     Ok(Settings {
         taps,
-        robust: RobustProblem::of(spec),
-        deviations: Deviations::of(spec),
+        robust: robust_box(spec),
+        deviations: Deviations::averaged_over(spec),
         gamma_margin: spec.design.gamma_margin,
         at_slow_rate: separate.then(at_slow_rate).transpose()?,
         ..Settings::default()
@@ -389,7 +388,9 @@ fn with_usual_noise(spec: &Spec) -> Spec {
 /// The spec with uncertain delays as jitter, for a method that averages over them.
 fn with_uncertain_instants(spec: &Spec) -> Spec {
     let mut noisy = spec.clone();
-    for (channel, deviations) in noisy.channels.iter_mut().zip(Deviations::of(spec).unwrap_or_default()) {
+    for (channel, deviations) in
+        noisy.channels.iter_mut().zip(Deviations::averaged_over(spec).unwrap_or_default())
+    {
         let delay = spec.fast_period * deviations.delay.0;
         channel.jitter = Seconds(channel.jitter.0.hypot(delay.0));
     }
@@ -397,12 +398,8 @@ fn with_uncertain_instants(spec: &Spec) -> Spec {
 }
 
 /// The root of the mean square of error and noise together, per fast sample.
-fn whole_error(plant: &LiftedPlant, filters: &Filters) -> Result<f64, DesignError> {
-    let system = match filters {
-        Filters::Fir(taps) => StateSpace::fir(&filters::polyphase(taps, plant.ratio())),
-        Filters::StateSpace(system) => system.clone(),
-    };
-    let error = plant.with_noise().error_system(&system);
+fn whole_error(plant: &LiftedPlant, filters: &SynthesisFilters) -> Result<f64, DesignError> {
+    let error = plant.with_noise().error_system(&filters::lifted(filters, plant.ratio()));
     Ok(h2_norm(&error)? / (plant.ratio() as f64).sqrt())
 }
 

@@ -31,7 +31,6 @@ mod signal;
 mod simple;
 mod snr;
 mod spline;
-mod spread;
 #[cfg(test)]
 mod tests;
 mod tones;
@@ -43,12 +42,10 @@ pub use tones::Tone;
 
 use crate::analog::resolved_band;
 use crate::bank::Bank;
-use crate::design::filters::FilterResponse;
-use crate::design::{DesignError, LiftedPlant, Problem};
+use crate::design::{DesignError, Deviations, LiftedPlant, Problem};
 use crate::spec::{Band, Spec};
 use crate::units::{CyclesPerFastPeriod, Decibels, Hertz};
 use snr::Setting;
-use spread::Spread;
 use tones::{ToneResponse, Worst};
 
 /// By how many decibels a bank must beat the simple ways to be worth its trouble.
@@ -108,12 +105,12 @@ impl Figures {
         let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
         let plain = without_signal(spec, bank.latency)?;
         let band = FigureBand::new(spec, &plain);
-        let tones = ToneResponse::new(plain.clone(), FilterResponse::new(bank)?, Spread::of_spec(spec));
+        let tones = ToneResponse::new(bank, plain.clone(), Deviations::of_spec(spec))?;
         let Worst { image, gain_error, vanishes } = tones.worst(band.cycles(spec));
         let setting = Setting::new(spec, bank.latency, &band)?;
         let ways = simple::ways(setting.problem());
         let ratios = setting.ratios(&ways);
-        let own = setting.ratio_of_bank(FilterResponse::new(bank)?);
+        let own = setting.ratio_of_bank(bank)?;
         Ok(Self {
             band,
             snr: own.snr,
@@ -151,7 +148,7 @@ impl Figures {
 pub fn snr(bank: &Bank) -> Result<Snr, DesignError> {
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
     let band = FigureBand::new(spec, &without_signal(spec, bank.latency)?);
-    Ok(Setting::new(spec, bank.latency, &band)?.ratio_of_bank(FilterResponse::new(bank)?).snr)
+    Ok(Setting::new(spec, bank.latency, &band)?.ratio_of_bank(bank)?.snr)
 }
 
 /// The two figures that errors of the channels change most.
@@ -172,8 +169,7 @@ impl KeyFigures {
         let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
         let plain = without_signal(spec, bank.latency)?;
         let band = FigureBand::new(spec, &plain).cycles(spec);
-        let Worst { image, .. } =
-            ToneResponse::new(plain, FilterResponse::new(bank)?, Spread::of_spec(spec)).worst(band);
+        let Worst { image, .. } = ToneResponse::new(bank, plain, Deviations::of_spec(spec))?.worst(band);
         let image_db = image.map(|tone| Decibels::of_amplitude(tone.image));
         Ok(Self { snr_db: snr(bank)?.total_db, image_db })
     }
@@ -202,8 +198,7 @@ pub fn tone_curve(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Tone)>, Desi
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
     let plain = without_signal(spec, bank.latency)?;
     let band = FigureBand::new(spec, &plain).cycles(spec);
-    let tones =
-        ToneResponse::new(plain, FilterResponse::new(bank)?, Spread::of_spec(spec)).curve(band, points);
+    let tones = ToneResponse::new(bank, plain, Deviations::of_spec(spec))?.curve(band, points);
     let hertz = |CyclesPerFastPeriod(f): CyclesPerFastPeriod| Hertz(f / spec.fast_period.0);
     Ok(tones.into_iter().map(|tone| (hertz(tone.frequency), tone)).collect())
 }

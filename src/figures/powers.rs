@@ -4,7 +4,7 @@
 use super::integral::mean_over_circle;
 use super::reconstruction::Reconstruction;
 use super::signal::{Columns, Signal};
-use super::spread::Spread;
+use crate::design::Deviations;
 use crate::linalg::{CMat, Complex};
 use std::ops::Range;
 
@@ -20,7 +20,7 @@ pub(super) struct Conditions<'a> {
     /// s_i^2 of each channel, in the scale of the signal's unit density.
     pub(super) noise: Vec<f64>,
     /// How far each converter is from the spec.
-    pub(super) spread: Vec<Spread>,
+    pub(super) spread: Vec<Deviations>,
 }
 
 /// Mean squares per fast sample.
@@ -84,7 +84,7 @@ impl Conditions<'_> {
     }
 
     /// The sum over the converters, whose errors are independent.
-    fn of_converters(&self, of: impl Fn(&Spread, Range<usize>) -> f64) -> f64 {
+    fn of_converters(&self, of: impl Fn(&Deviations, Range<usize>) -> f64) -> f64 {
         let converters = self.signal.problem().converters().into_iter();
         self.spread.iter().zip(converters).map(|(spread, samples)| of(spread, samples)).sum()
     }

@@ -4,10 +4,10 @@ use super::band::FigureBand;
 use super::powers::{Conditions, Powers, target_power};
 use super::reconstruction::Reconstruction;
 use super::signal::Signal;
-use super::spread::Spread;
 use super::without_signal;
+use crate::bank::Bank;
 use crate::design::filters::FilterResponse;
-use crate::design::{DesignError, Problem};
+use crate::design::{DesignError, Deviations, Problem};
 use crate::spec::{SignalSpectrum, Spec, USUAL_RMS};
 use crate::units::Decibels;
 use std::f64::consts::TAU;
@@ -57,7 +57,7 @@ pub(super) struct Setting {
     noise: Vec<f64>,
     noise_is_stated: bool,
     /// Of the converters; offsets are in the scale of the signal.
-    spread: Vec<Spread>,
+    spread: Vec<Deviations>,
 }
 
 impl Setting {
@@ -93,8 +93,8 @@ impl Setting {
         } else {
             vec![ROUNDING_16_BITS * full_scale; stated.len()]
         };
-        let scaled = |spread: Spread| Spread { offset: spread.offset * full_scale.sqrt(), ..spread };
-        let spread = Spread::of_spec(spec).into_iter().map(scaled).collect();
+        let scaled = |spread: Deviations| Deviations { offset: spread.offset * full_scale.sqrt(), ..spread };
+        let spread = Deviations::of_spec(spec).into_iter().map(scaled).collect();
         Ok(Self { signal, target, noise, noise_is_stated, spread })
     }
 
@@ -104,8 +104,12 @@ impl Setting {
     }
 
     /// The ratio of the bank itself.
-    pub(super) fn ratio_of_bank(&self, bank: FilterResponse) -> Ratios {
-        self.ratios(&[Reconstruction::Bank(bank)]).pop().unwrap_or_default()
+    ///
+    /// # Errors
+    /// [`DesignError::Lti`] for unstable filters.
+    pub(super) fn ratio_of_bank(&self, bank: &Bank) -> Result<Ratios, DesignError> {
+        let filters = FilterResponse::new(&bank.filters, bank.ratio)?;
+        Ok(self.ratios(&[Reconstruction::Bank(filters)]).pop().unwrap_or_default())
     }
 
     /// The ratios of several ways.
@@ -118,7 +122,7 @@ impl Setting {
     fn ratio(&self, powers: &Powers) -> Ratios {
         let Powers { signal, late, gains, offsets, noise, .. } = *powers;
         let db = |power: f64| Decibels::of_power(self.target / power);
-        let of = |error: fn(&Spread) -> f64, power: f64| {
+        let of = |error: fn(&Deviations) -> f64, power: f64| {
             self.spread.iter().any(|spread| error(spread) > 0.0).then(|| db(power.max(0.0)))
         };
         let all = late + gains + offsets;

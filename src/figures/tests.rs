@@ -5,9 +5,9 @@ use super::powers::{Conditions, target_power};
 use super::reconstruction::Reconstruction;
 use super::signal::Signal;
 use super::snr::Ratios;
-use super::spread::Spread;
 use super::*;
 use crate::bank::SynthesisFilters;
+use crate::design::filters::FilterResponse;
 use crate::design::{Options, analyze_mean, design, filters};
 use crate::linalg::{self, Mat};
 use crate::random::Random;
@@ -81,7 +81,7 @@ fn simple_ways_have_the_digits_of_another_program() {
         let plain = without_signal(&system.spec(SINC), 24).unwrap();
         let signal = Signal::in_band(plain.clone(), 0.0..=TAU * system.band);
         let channels = system.delays.len();
-        let spread = vec![Spread::default(); channels];
+        let spread = vec![Deviations::default(); channels];
         let conditions = Conditions { signal: &signal, noise: vec![0.0; channels], spread };
         let ways = simple::ways(&plain);
         let target = target_power(&signal);
@@ -143,10 +143,12 @@ fn errors_of_noise_and_of_uncertain_delays_have_the_digits_of_covariances() {
         let bank = mean_square_optimum(noise);
         let plain = without_signal(bank.spec.as_ref().unwrap(), 10).unwrap();
         let signal = Signal::everywhere(plain.clone());
-        let spread =
-            [0.0, spread].map(|delay| Spread { delay: FastPeriods(delay), ..Spread::default() }).to_vec();
+        let spread = [0.0, spread]
+            .map(|delay| Deviations { delay: FastPeriods(delay), ..Deviations::default() })
+            .to_vec();
         let conditions = Conditions { signal: &signal, noise: plain.noise, spread };
-        let powers = conditions.powers(&[Reconstruction::Bank(FilterResponse::new(&bank).unwrap())])[0];
+        let powers = conditions
+            .powers(&[Reconstruction::Bank(FilterResponse::new(&bank.filters, bank.ratio).unwrap())])[0];
         let rms = (powers.late + powers.noise).sqrt();
         assert!((rms / want - 1.0).abs() < 1e-5, "{noise} {:?}: {rms} {want}", conditions.spread);
     }
@@ -164,9 +166,10 @@ fn the_error_from_white_noise_is_that_of_the_error_system() {
         let conditions = Conditions {
             signal: &signal,
             noise: vec![1.0; bank.channel_count()],
-            spread: vec![Spread::default(); bank.channel_count()],
+            spread: vec![Deviations::default(); bank.channel_count()],
         };
-        let powers = conditions.powers(&[Reconstruction::Bank(FilterResponse::new(&bank).unwrap())])[0];
+        let powers = conditions
+            .powers(&[Reconstruction::Bank(FilterResponse::new(&bank.filters, bank.ratio).unwrap())])[0];
         let mean = analyze_mean(&bank).unwrap();
         let rms = powers.signal.sqrt();
         assert!((rms / mean.rms_error - 1.0).abs() < accuracy, "{rms} {}", mean.rms_error);
@@ -370,8 +373,8 @@ fn check_image(
     let beside = lines.iter().enumerate().filter(|(k, _)| *k != folded).map(|(_, x)| *x).fold(0.0, f64::max);
     let measured = Decibels::of_amplitude(beside / lines[folded]).0;
     let plain = without_signal(bank.spec.as_ref().unwrap(), bank.latency).unwrap();
-    let exact = vec![Spread::default(); bank.channel_count()];
-    let tones = ToneResponse::new(plain, FilterResponse::new(bank).unwrap(), exact);
+    let exact = vec![Deviations::default(); bank.channel_count()];
+    let tones = ToneResponse::new(bank, plain, exact).unwrap();
     let there = tones.at(bin as f64 / length as f64);
     let predicted = Decibels::of_amplitude(there.image).0;
     println!("seed {seed}: image {measured:.3} dB, predicted {predicted:.3} dB");

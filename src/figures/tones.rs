@@ -1,8 +1,8 @@
 //! What a bank makes of a tone: its images and its error of gain and phase.
 
-use super::spread::Spread;
-use crate::design::Problem;
+use crate::bank::Bank;
 use crate::design::filters::FilterResponse;
+use crate::design::{DesignError, Deviations, Problem};
 use crate::linalg::{CMat, Complex, fourier};
 use crate::units::{CyclesPerFastPeriod, RadiansPerFastPeriod};
 use std::f64::consts::TAU;
@@ -49,14 +49,17 @@ pub(super) struct ToneResponse {
     problem: Problem,
     filters: FilterResponse,
     /// Of the converters.
-    spread: Vec<Spread>,
+    spread: Vec<Deviations>,
 }
 
 impl ToneResponse {
-    /// Of the `filters` of a bank after the front ends of `problem`, without the spectrum of a signal, for
+    /// Of the filters of `bank` after the front ends of `problem`, without the spectrum of a signal, for
     /// converters that are off by so much.
-    pub(super) fn new(problem: Problem, filters: FilterResponse, spread: Vec<Spread>) -> Self {
-        Self { problem, filters, spread }
+    ///
+    /// # Errors
+    /// [`DesignError::Lti`] for unstable filters.
+    pub(super) fn new(bank: &Bank, problem: Problem, spread: Vec<Deviations>) -> Result<Self, DesignError> {
+        Ok(Self { problem, filters: FilterResponse::new(&bank.filters, bank.ratio)?, spread })
     }
 
     /// The output at w / (2 pi) = `frequency`.
@@ -164,6 +167,25 @@ impl ToneResponse {
             if value(&left) > value(&right) { high = b } else { low = a }
         }
         best
+    }
+}
+
+/// What errors of a converter make of a tone.
+impl Deviations {
+    /// A delay that is off by a Gaussian error of deviation s turns a sample of the frequency w by a random
+    /// phase, whose mean is chi = e^{-(w s)^2 / 2}.
+    pub(super) fn mean_phase(&self, w: f64) -> f64 {
+        (-0.5 * (w * self.delay.0).powi(2)).exp()
+    }
+
+    /// 1 - chi^2, the power of what the random phase has beside its mean.
+    pub(super) fn phase_power(&self, w: f64) -> f64 {
+        -(-(w * self.delay.0).powi(2)).exp_m1()
+    }
+
+    /// The power of what a sample has beside its mean, relative to the sample without errors.
+    pub(super) fn power(&self, w: f64) -> f64 {
+        self.phase_power(w) + self.gain * self.gain
     }
 }
 

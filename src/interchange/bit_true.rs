@@ -48,10 +48,9 @@ impl WordSizes {
 /// let bank = Bank::bare(SynthesisFilters::Fir(words.taps()), 2);
 /// let bank = Bank { fixed_point: Some(words), ..bank };
 /// let mut integer_bank = BitTrue::new(&bank, WordSizes { input: 8, accumulator: 16, output: 8 })?;
-/// let mut output = [0; 2];
-/// integer_bank.process(&[2], &mut output);
 /// // 1.5 is rounded upwards.
-/// assert_eq!((output, integer_bank.wraps()), ([2, -1], 0));
+/// assert_eq!(integer_bank.filtered(&[2]), [2, -1]);
+/// assert_eq!(integer_bank.wraps(), 0);
 /// # Ok::<(), hybank::interchange::ExportError>(())
 /// ```
 #[derive(Debug, Clone)]
@@ -103,14 +102,22 @@ impl BitTrue {
         self.filters.resting.iter().map(|x| *x as i32).collect()
     }
 
-    /// Takes N samples of so many bits, one of each channel, and writes M output samples. Further values are
-    /// left alone.
-    pub fn process(&mut self, input: &[i32], output: &mut [i32]) {
-        let PolyphaseTaps { channels: n, ratio, lags, .. } = self.filters.taps;
+    /// The M output samples of each of these frames of N samples, one of each channel.
+    pub fn filtered(&mut self, frames: &[i32]) -> Vec<i32> {
+        let PolyphaseTaps { channels, ratio, .. } = self.filters.taps;
+        let mut outputs = vec![0; frames.len() / channels * ratio];
+        let each = frames.chunks_exact(channels).zip(outputs.chunks_exact_mut(ratio));
+        each.for_each(|(frame, output)| self.process(frame, output));
+        outputs
+    }
+
+    /// Takes N samples of so many bits, one of each channel, and writes M output samples.
+    fn process(&mut self, input: &[i32], output: &mut [i32]) {
+        let PolyphaseTaps { channels: n, lags, .. } = self.filters.taps;
         self.newest = self.newest.checked_sub(1).unwrap_or(lags - 1);
         let newest = &mut self.history[self.newest * n..][..n];
         newest.iter_mut().zip(input).for_each(|(slot, x)| *slot = i64::from(*x));
-        for (p, y) in output.iter_mut().take(ratio).enumerate() {
+        for (p, y) in output.iter_mut().enumerate() {
             let sum = self.wrapped(self.sum(p));
             *y = self.saturated(rounded(sum, self.fraction_bits));
         }

@@ -1,22 +1,6 @@
-//! What the interior-point methods share: their loop, their step rule and their outcome.
+//! What the interior-point methods share: their loop and their step rule.
 
 use crate::linalg::LinalgError;
-
-/// How an iteration ended. Bounds, residuals and iterates are returned beside it; a hard problem is not an
-/// error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Outcome {
-    /// The duality gap is within the tolerance.
-    Solved,
-    /// No further progress, but the duality gap is within the reduced tolerance.
-    SolvedInaccurate,
-    /// The iteration limit was reached first, or the caller ended the iteration; the best iterate and its
-    /// bounds are returned.
-    IterationLimit,
-    /// Rounding errors stopped the progress; the best iterate and its bounds are returned.
-    NumericalTrouble,
-}
 
 /// Relative duality gap that is as small as rounding errors allow.
 pub const FINEST_GAP: f64 = 1e-9;
@@ -25,8 +9,6 @@ pub const FINEST_GAP: f64 = 1e-9;
 const MOST_STEPS: usize = 80;
 /// Duality gap that counts as zero, relative to the size of the data: the largest `sigma_max(W_l)`.
 pub(super) const GAP_OF_ZERO: f64 = 1e-13;
-/// Relative duality gap up to which a stalled run still counts as solved.
-const REDUCED_GAP: f64 = 1e-5;
 /// Combinations of unknowns whose effect is below this, relative to the largest, are dropped in the
 /// least-squares start.
 pub(super) const RANK_TOLERANCE: f64 = 1e-11;
@@ -84,18 +66,18 @@ pub(super) trait Iterate {
 }
 
 /// Iterates until the relative gap is within its tolerance, the progress ends, the limit is reached or
-/// the end `is_due`. Returns the outcome and the number of steps. An iterate whose end is due is not
-/// judged: that takes as long as several steps.
+/// the end `is_due`. Returns whether the gap is within the tolerance, and the number of steps. An iterate
+/// whose end is due is not judged: that takes as long as several steps.
 pub(super) fn run(
     iterate: &mut impl Iterate,
     tol_gap_rel: f64,
     is_due: IsDue<'_>,
-) -> Result<(Outcome, usize), LinalgError> {
+) -> Result<(bool, usize), LinalgError> {
     let (mut least, mut waited, mut steps) = (f64::INFINITY, 0, 0);
     while steps < MOST_STEPS && !is_due() {
         let gap = iterate.gap();
         if gap <= tol_gap_rel && iterate.judged_gap()? <= tol_gap_rel {
-            return Ok((Outcome::Solved, steps));
+            return Ok((true, steps));
         }
         waited = if gap < PROGRESS_SHARE * least { 0 } else { waited + 1 };
         least = least.min(gap);
@@ -104,14 +86,5 @@ pub(super) fn run(
         }
         steps += 1;
     }
-    if is_due() {
-        return Ok((Outcome::IterationLimit, steps));
-    }
-    let outcome = match iterate.judged_gap()? {
-        gap if gap <= tol_gap_rel => Outcome::Solved,
-        gap if gap <= REDUCED_GAP => Outcome::SolvedInaccurate,
-        _ if steps >= MOST_STEPS => Outcome::IterationLimit,
-        _ => Outcome::NumericalTrouble,
-    };
-    Ok((outcome, steps))
+    Ok((!is_due() && iterate.judged_gap()? <= tol_gap_rel, steps))
 }

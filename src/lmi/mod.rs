@@ -6,9 +6,8 @@
 //! 5.4, whose Lyapunov matrix the frequencies replace.
 //!
 //! The worst case and the mean square under a cap are primal-dual predictor-corrector methods with one loop
-//! and one step rule (`iteration`). A hard problem is not an error: the solver returns its best iterate,
-//! bounds on the optimum and an [`Outcome`]. Rounding errors limit the relative accuracy of the optimum to
-//! about 1e-9.
+//! and one step rule (`iteration`). A hard problem is not an error: the solver returns its best iterate
+//! and bounds on the optimum. Rounding errors limit the relative accuracy of the optimum to about 1e-9.
 
 mod factor;
 mod iteration;
@@ -17,4 +16,4 @@ pub mod sampled;
 #[path = "../../tests/support/testbank.rs"]
 mod testbank;
 
-pub use iteration::{FINEST_GAP, IsDue, Outcome};
+pub use iteration::{FINEST_GAP, IsDue};

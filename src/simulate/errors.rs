@@ -174,7 +174,9 @@ impl ConverterErrors {
         let most_delay = (spec.fast_period * MAX_LATENCY as f64).0;
         let delays: Vec<f64> = self.delay_error.iter().map(|e| e.in_seconds(spec.fast_period).0).collect();
         let delays = checked("delay_error", &delays, channels, |x| check_delay(x, most_delay))?;
-        let gains = checked("gain_error", &self.gain_error, channels, check_gain_error)?;
+        let gains = checked("gain_error", &self.gain_error, channels, |x| {
+            check_share(x, MOST_GAIN_ERROR, "the gain")
+        })?;
         let cutoffs = self.cutoffs(channels)?;
         let offsets = checked("offset", &self.offset, channels, check_offset)?;
         let each = |(i, channel): (usize, &ChannelSpec)| VirtualConverter {
@@ -224,7 +226,9 @@ impl ConverterErrors {
     }
 
     fn cutoffs(&self, channels: usize) -> Result<Vec<f64>, RefusedError> {
-        checked("cutoff_error", &self.cutoff_error, channels, check_cutoff_error)
+        checked("cutoff_error", &self.cutoff_error, channels, |x| {
+            check_share(x, MOST_CUTOFF_ERROR, "a cut-off")
+        })
     }
 }
 
@@ -263,16 +267,7 @@ fn check_delay(seconds: f64, most: f64) -> Result<(), SpecProblem> {
     within(seconds, -most..=most, "s", rule)
 }
 
-fn check_gain_error(error: f64) -> Result<(), SpecProblem> {
-    let rule = format!(
-        "an error of the gain is relative, -{MOST_GAIN_ERROR} to {MOST_GAIN_ERROR}; 0.01 is one per cent"
-    );
-    within(error, -MOST_GAIN_ERROR..=MOST_GAIN_ERROR, "(relative)", rule)
-}
-
-fn check_cutoff_error(error: f64) -> Result<(), SpecProblem> {
-    let rule = format!(
-        "an error of a cut-off is relative, -{MOST_CUTOFF_ERROR} to {MOST_CUTOFF_ERROR}; 0.01 is one per cent"
-    );
-    within(error, -MOST_CUTOFF_ERROR..=MOST_CUTOFF_ERROR, "(relative)", rule)
+fn check_share(error: f64, most: f64, what: &str) -> Result<(), SpecProblem> {
+    let rule = format!("an error of {what} is relative, -{most} to {most}; 0.01 is one per cent");
+    within(error, -most..=most, "(relative)", rule)
 }

@@ -6,7 +6,9 @@
 
 use super::source::{NormalisedSource, Source};
 use crate::analog::StrictlyProper;
+use crate::linalg::Mat;
 use crate::units::FastPeriods;
+use nalgebra::DVector;
 use std::ops::Range;
 
 /// 1 / 19! is below the rounding error.
@@ -87,29 +89,28 @@ struct Walker<'a> {
     /// Panels per fast period.
     rate: f64,
     now: f64,
-    state: Vec<f64>,
-    /// A / rate, row by row.
-    a: Vec<Vec<f64>>,
+    state: DVector<f64>,
+    /// A / rate.
+    a: Mat,
     /// (A / rate)^m B / m!.
-    inputs: Vec<Vec<f64>>,
-    c: Vec<f64>,
+    inputs: Vec<DVector<f64>>,
+    c: &'a Mat,
 }
 
 impl<'a> Walker<'a> {
     /// At rest at the beginning of the support.
-    fn new(filter: &StrictlyProper, source: &'a NormalisedSource, support: Range<f64>, rate: f64) -> Self {
-        let n = filter.order();
-        let a: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| filter.a()[(i, j)] / rate).collect()).collect();
-        let mut inputs = vec![filter.b().iter().copied().collect::<Vec<f64>>()];
+    fn new(filter: &'a StrictlyProper, source: &'a NormalisedSource, support: Range<f64>, rate: f64) -> Self {
+        let a = filter.a() / rate;
+        let mut inputs = vec![filter.b().column(0).into_owned()];
         for m in 1..TERMS {
-            inputs.push(multiplied(&a, &inputs[m - 1], 1.0 / m as f64));
+            inputs.push(&a * &inputs[m - 1] / m as f64);
         }
-        let c = filter.c().iter().copied().collect();
-        Self { now: support.start, source, support, rate, state: vec![0.0; n], a, inputs, c }
+        let state = DVector::zeros(filter.order());
+        Self { now: support.start, source, support, rate, state, a, inputs, c: filter.c() }
     }
 
     fn output(&self) -> f64 {
-        dot(&self.c, &self.state)
+        (self.c * &self.state)[0]
     }
 
     /// Moves on to `target`; stays where it is if that is not later.
@@ -132,12 +133,12 @@ impl<'a> Walker<'a> {
     fn panel(&mut self, begin: f64, length: f64) {
         let mut term = self.state.clone();
         for m in 1..TERMS {
-            term = multiplied(&self.a, &term, length * self.rate / m as f64);
-            add(&mut self.state, &term, 1.0);
+            term = &self.a * term * (length * self.rate / m as f64);
+            self.state += &term;
         }
         if begin + 0.5 * length < self.support.end {
             for (moment, input) in self.moments(begin, length).iter().zip(&self.inputs) {
-                add(&mut self.state, input, *moment);
+                self.state.axpy(*moment, input, 1.0);
             }
         }
     }
@@ -157,18 +158,6 @@ impl<'a> Walker<'a> {
         }
         moments
     }
-}
-
-fn multiplied(a: &[Vec<f64>], x: &[f64], factor: f64) -> Vec<f64> {
-    a.iter().map(|row| factor * dot(row, x)).collect()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn add(to: &mut [f64], x: &[f64], factor: f64) {
-    to.iter_mut().zip(x).for_each(|(to, x)| *to += factor * x);
 }
 
 #[cfg(test)]

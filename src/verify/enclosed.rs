@@ -7,7 +7,7 @@ use super::front_ends::FrontEnds;
 use super::slow_period::SlowPeriod;
 use super::system::{EnclosedSystem, Midpoint};
 use super::timeline::{SamplingInstant, delay_periods, timeline};
-use super::{MAX_STATES, Strictness, Verified, VerifyError, gain, statements, upper};
+use super::{MAX_STATES, Strictness, Verified, VerifyError, gain, statements};
 use crate::arithmetic::{ComplexBall, Float512, Number};
 use crate::bank::{Bank, Certificate, GainWitness, Gamma};
 use crate::linalg::{CMat, Complex};
@@ -80,8 +80,8 @@ impl<'a> EnclosedErrorSystem<'a> {
     pub fn certifies(&self, certificate: &Certificate) -> bool {
         let long = !certificate.correction.is_empty() && self.states() <= MAX_CORRECTED_STATES;
         let factor = [&certificate.factor[..], &certificate.correction[..]];
-        upper::proves(&self.equations, certificate.gamma, factor)
-            || long && upper::proves(self.long_equations(), certificate.gamma, factor)
+        self.equations.proves(certificate.gamma, factor)
+            || long && self.long_equations().proves(certificate.gamma, factor)
     }
 
     /// The error system in 512 bits.

@@ -47,7 +47,7 @@ fn error_samples<F: Number>(
     a: &DMatrix<ComplexBall<F>>,
 ) -> DMatrix<ComplexBall<F>> {
     let through = ball::product(&adjoint(&spectrum::filter_response(filters, ratio, z)), a);
-    spectrum::above(a, &through.map(|x| -x))
+    ball::above(a, &through.map(|x| -x))
 }
 
 /// A lower bound of the root of `square`; `None` if it is unknown.

@@ -39,7 +39,6 @@
 //! ```
 
 mod ball;
-mod covariance;
 pub(crate) mod enclosed;
 mod error;
 mod error_system;
@@ -55,7 +54,6 @@ mod system;
 mod tests;
 mod timeline;
 mod uncertainty;
-mod upper;
 
 pub use self::enclosed::EnclosedErrorSystem;
 pub use self::error::VerifyError;

@@ -36,16 +36,6 @@ pub(super) fn adjoint<F: Number>(m: &DMatrix<ComplexBall<F>>) -> DMatrix<Complex
     m.transpose().map(ComplexBall::conj)
 }
 
-/// The rows of `a`, then those of `below`.
-pub(super) fn above<F: Number>(
-    a: &DMatrix<ComplexBall<F>>,
-    below: &DMatrix<ComplexBall<F>>,
-) -> DMatrix<ComplexBall<F>> {
-    DMatrix::from_fn(a.nrows() + below.nrows(), a.ncols(), |i, j| {
-        if i < a.nrows() { a[(i, j)] } else { below[(i - a.nrows(), j)] }
-    })
-}
-
 fn complex<F: Number>(m: &Matrix<F>) -> DMatrix<ComplexBall<F>> {
     m.map(ComplexBall::from)
 }
@@ -179,7 +169,7 @@ pub(super) fn gram_times<F: Number>(
     let late = with_rows_times(b, &earlier);
     let state = ball::product(&outputs.transpose(), &late);
     let state = resolved(&period.transition.transpose(), z.conj(), &state);
-    let input = ball::product(&complex(&period.gram), &above(&state, &late));
+    let input = ball::product(&complex(&period.gram), &ball::above(&state, &late));
     let state = resolved(&period.transition, z, &input.rows(0, n).into_owned());
     with_rows_times(&(ball::product(&outputs, &state) + input.rows(n, samples)), &phases)
 }

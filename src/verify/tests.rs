@@ -112,7 +112,7 @@ fn designers(bank: &Bank, omega: f64) -> CMat {
 fn enclosed(error: &EnclosedErrorSystem<'_>, half: [f64; 2]) -> DMatrix<ComplexBall<DoubleDouble>> {
     let (bank, z) = (error.bank, spectrum::unit(half));
     let through = spectrum::filter_response(&bank.filters, bank.ratio, z);
-    let combine = spectrum::above(&ball::identity(bank.ratio), &spectrum::adjoint(&through).map(|x| -x));
+    let combine = ball::above(&ball::identity(bank.ratio), &spectrum::adjoint(&through).map(|x| -x));
     let gram = spectrum::gram(&error.period, z);
     ball::product(&ball::product(&spectrum::adjoint(&combine), &gram), &combine)
 }

@@ -150,7 +150,7 @@ fn the_interval_of_the_thesis_bank_is_proved_in_floating_point() {
         let proof = certify(&bank).unwrap();
         let norm = bank.gamma.norm.unwrap();
         assert!(
-            proof.attained <= proof.gamma && proof.gamma >= norm && proof.gamma <= norm * (1.0 + 1e-5),
+            proof.attained <= proof.upper && proof.upper >= norm && proof.upper <= norm * (1.0 + 1e-5),
             "{proof:?} {norm}"
         );
     }

@@ -12,7 +12,6 @@ fn reduced(mut spec: Spec, method: Method, reduction: Reduction) -> Design {
     match reduction {
         Reduction::Order(order) => spec.design.order = Some(order),
         Reduction::Loss(db) => spec.design.reduction_loss_db = Some(db),
-        _ => unreachable!("there are two ways"),
     }
     design(&spec, &Options::default()).unwrap()
 }

@@ -73,8 +73,8 @@ fn delays_next_to_whole_numbers_are_not_rounded() {
         assert!((example.norm() / norm - 1.0).abs() < 1e-2, "{delay}: {}", example.norm());
         let proven = certify(&example.bank()).unwrap();
         assert!(proven.attained <= example.norm() * (1.0 + 1e-9), "{delay}: {proven:?}");
-        assert!(proven.gamma >= example.norm() * (1.0 - 1e-9), "{delay}: {proven:?}");
-        assert!(proven.gamma <= example.norm() * (1.0 + 1e-6), "{delay}: {proven:?}");
+        assert!(proven.upper >= example.norm() * (1.0 - 1e-9), "{delay}: {proven:?}");
+        assert!(proven.upper <= example.norm() * (1.0 + 1e-6), "{delay}: {proven:?}");
     }
 }
 
@@ -105,7 +105,7 @@ fn no_interval_excludes_the_true_norm_for_any_delay() {
                 // The oracle computes in doubles; below 1e-9 of the scale it is rounding itself.
                 let slack = 1e-7 * norm + 1e-9 * scale;
                 assert!(found.attained <= norm + slack, "{}: {norm:e} {found:?}", what());
-                assert!(found.gamma >= norm - slack, "{}: {norm:e} {found:?}", what());
+                assert!(found.upper >= norm - slack, "{}: {norm:e} {found:?}", what());
             }
             Err(_) => refused += 1,
         }

@@ -97,8 +97,8 @@ fn with_tap(spec: &Spec, tap: f64) -> Bank {
 fn has_norm(bank: &Bank, norm: f64) {
     let proven = certify(bank).unwrap();
     assert!(proven.attained <= norm * (1.0 + 1e-10), "attained {:e} > {norm:e}", proven.attained);
-    assert!(proven.gamma >= norm * (1.0 - 1e-10), "upper {:e} < {norm:e}", proven.gamma);
-    assert!(proven.gamma - proven.attained <= 1e-5 * norm, "{proven:?}");
+    assert!(proven.upper >= norm * (1.0 - 1e-10), "upper {:e} < {norm:e}", proven.upper);
+    assert!(proven.upper - proven.attained <= 1e-5 * norm, "{proven:?}");
 }
 
 /// The norms for a tap of one: the largest root of the sum of |T - C|^2 over 17 aliases, by mpmath with 80

@@ -1,14 +1,15 @@
 //! The invariants of every bank, read or designed.
 
+use crate::messages::Number;
 use crate::spec::{
-    At, FrameSample, MAX_CHANNELS, MAX_ENTRY, MAX_RATIO, Refusal, Spec, SpecProblem, check_fast_period,
-    check_fraction_bits, check_gain, check_offset,
+    At, FrameSample, MAX_CHANNELS, MAX_ENTRY, Refusal, Spec, SpecProblem, check_channel_count,
+    check_fast_period, check_fraction_bits, check_gain, check_offset, check_ratio, refused, within,
 };
 use crate::units::Seconds;
 
 use super::{
-    Bank, BankError, BankProblem, BoxProof, Certificate, FixedPoint, GainWitness, Gamma, NormBound, Proof,
-    StateSpace, SynthesisFilters,
+    Bank, BoxProof, Certificate, FixedPoint, GainWitness, Gamma, NormBound, Proof, StateSpace,
+    SynthesisFilters,
 };
 
 /// Largest m0 in a bank file. `fuse` appends as many zeros to a recording; 16 million are 3 minutes at 96
@@ -19,33 +20,22 @@ pub const MAX_BANK_LATENCY: usize = 1 << 24;
 /// rounding.
 const SPEC_TOLERANCE: f64 = 1e-9;
 
-type Checked = Result<(), BankError>;
-
-fn refuse(path: impl Into<String>, problem: impl Into<BankProblem>) -> Checked {
-    Err(Refusal::new(path, problem))
-}
+type Checked = Result<(), Refusal>;
 
 fn out_of_range(path: impl Into<String>, value: f64, unit: &'static str, rule: impl Into<String>) -> Checked {
-    refuse(path, SpecProblem::Range { value, unit, rule: rule.into() })
+    Err(Refusal::new(path, SpecProblem::Range { value, unit, rule: rule.into() }))
 }
 
 /// A list at `path` has `expected` entries, counted in `unit`.
-fn check_length(
-    path: impl Into<String>,
-    found: usize,
-    expected: usize,
-    unit: &'static str,
-    rule: &'static str,
-) -> Checked {
-    if found == expected { Ok(()) } else { refuse(path, BankProblem::Length { found, expected, unit, rule }) }
+pub(super) fn check_length(path: &str, found: usize, expected: usize, unit: &str, rule: &str) -> Checked {
+    let problem = || refused(path, format!("{found} {unit}, but there must be {expected}: {rule}"));
+    if found == expected { Ok(()) } else { Err(problem()) }
 }
 
 /// A certified norm is zero or more, and not too large.
 fn check_norm(path: &str, gamma: f64) -> Checked {
-    if (0.0..=MAX_ENTRY).contains(&gamma) {
-        return Ok(());
-    }
-    out_of_range(path, gamma, "(h = 1)", format!("a norm is zero or more, and at most {MAX_ENTRY:e}"))
+    let rule = format!("a norm is zero or more, and at most {MAX_ENTRY:e}");
+    within(gamma, 0.0..=MAX_ENTRY, "(h = 1)", rule).at(path)
 }
 
 impl Bank {
@@ -55,8 +45,8 @@ impl Bank {
     /// This does not check whether a state-space bank is stable; the design modules do.
     ///
     /// # Errors
-    /// [`BankError`] with an empty file name and the JSON place of the first thing that is wrong.
-    pub fn check(&self) -> Result<(), BankError> {
+    /// [`Refusal`] with an empty file name and the JSON place of the first thing that is wrong.
+    pub fn check(&self) -> Checked {
         self.check_scalars()?;
         check_delays(&self.delays, self.fast_period)?;
         self.check_samples()?;
@@ -76,8 +66,7 @@ impl Bank {
     /// The taps are the integers, and each integer fits its bits.
     fn check_fixed_point(&self, words: &FixedPoint) -> Checked {
         let SynthesisFilters::Fir(taps) = &self.filters else {
-            let (method, expected, found) = (self.method.name(), "state_space", "fixed_point");
-            return refuse("fixed_point", BankProblem::Filters { method, expected, found });
+            return Err(self.of_another_method("fixed_point", "state_space", "fixed_point"));
         };
         words.bits.check(None).at("fixed_point.bits")?;
         check_fraction_bits(words.fraction_bits).at("fixed_point.fraction_bits")?;
@@ -96,7 +85,11 @@ impl Bank {
                 }
                 if tap != integer as f64 * words.step() {
                     let path = format!("{}[{n}]", self.taps_path(i));
-                    return refuse(path, BankProblem::NotTheInteger { tap, integer, step: words.step() });
+                    let rule = format!(
+                        "the tap {tap:e} is not {integer} times {:e}, as fixed_point says; take the original, or leave fixed_point out",
+                        words.step()
+                    );
+                    return Err(refused(&path, rule));
                 }
             }
         }
@@ -107,23 +100,26 @@ impl Bank {
     fn check_samples(&self) -> Checked {
         let rule = "every channel has a number of samples per frame";
         check_length("channels", self.samples.len(), self.channel_count(), "numbers of samples", rule)?;
-        if let Some(i) = self.samples.iter().position(|&samples| !(1..=MAX_CHANNELS).contains(&samples)) {
+        let most = MAX_CHANNELS as f64;
+        for (i, &samples) in self.samples.iter().enumerate() {
             let rule = format!("a converter has 1 to {MAX_CHANNELS} samples per frame");
-            return out_of_range(format!("channels[{i}].samples"), self.samples[i] as f64, "samples", rule);
+            within(samples as f64, 1.0..=most, "samples", rule).at(&format!("channels[{i}].samples"))?;
         }
-        let count = self.frame_samples();
-        if count > MAX_CHANNELS {
-            let rule = format!("a frame has at most {MAX_CHANNELS} samples");
-            return out_of_range("channels", count as f64, "samples", rule);
-        }
-        if self.latency < self.wait() {
-            let rule = format!(
-                "the last sample of a frame comes {} fast samples after the first, which the latency includes",
-                self.wait()
-            );
-            return out_of_range("latency", self.latency as f64, "fast samples", rule);
-        }
-        Ok(())
+        let rule = format!("a frame has at most {MAX_CHANNELS} samples");
+        within(self.frame_samples() as f64, 0.0..=most, "samples", rule).at("channels")?;
+        let wait = self.wait();
+        let rule = format!(
+            "the last sample of a frame comes {wait} fast samples after the first, which the latency includes"
+        );
+        within(self.latency as f64, wait as f64..=f64::MAX, "fast samples", rule).at("latency")
+    }
+
+    /// A part of the bank that its method has not.
+    fn of_another_method(&self, path: &str, expected: &str, found: &str) -> Refusal {
+        let method = self.method.name();
+        let rule =
+            format!("a bank of the method {method} holds {expected} and no {found}; change one or the other");
+        refused(path, rule)
     }
 
     /// The place of the taps of sample `i` of a frame.
@@ -162,16 +158,9 @@ impl Bank {
 
     fn check_scalars(&self) -> Checked {
         check_fast_period(self.fast_period).at("fast_period")?;
-        if !(1..=MAX_RATIO).contains(&self.ratio) {
-            let rule =
-                format!("ratio counts the fast samples for each slow one and must be 1 to {MAX_RATIO}");
-            return out_of_range("ratio", self.ratio as f64, "fast samples", rule);
-        }
-        if self.latency > MAX_BANK_LATENCY {
-            let rule = format!("latency must be 0 to {MAX_BANK_LATENCY}");
-            return out_of_range("latency", self.latency as f64, "fast samples", rule);
-        }
-        Ok(())
+        check_ratio(self.ratio).at("ratio")?;
+        let rule = format!("latency must be 0 to {MAX_BANK_LATENCY}");
+        within(self.latency as f64, 0.0..=MAX_BANK_LATENCY as f64, "fast samples", rule).at("latency")
     }
 
     fn check_method(&self) -> Checked {
@@ -181,7 +170,7 @@ impl Bank {
             return Ok(());
         }
         let (found, expected) = if fir { ("taps", "state_space") } else { ("state_space", "taps") };
-        refuse("method", BankProblem::Filters { method: self.method.name(), expected, found })
+        Err(self.of_another_method("method", expected, found))
     }
 
     fn check_spec(&self, spec: &Spec) -> Checked {
@@ -194,41 +183,43 @@ impl Bank {
         let rule = "the spec must describe every channel of the bank";
         check_length("spec.channel", spec.channels.len(), self.channel_count(), "channels", rule)?;
         for (i, (&own, &samples)) in self.samples.iter().zip(spec.layout().samples()).enumerate() {
-            agree(format!("channels[{i}].samples"), own as f64, samples as f64, 0.0)?;
+            agree(&format!("channels[{i}].samples"), own as f64, samples as f64, 0.0)?;
         }
         for (i, (&delay, channel)) in self.delays.iter().zip(&spec.channels).enumerate() {
             let path = |key: &str| format!("spec.channel[{i}].{key}");
-            agree(path("delay"), delay.0, channel.delay.0, (self.fast_period + delay).0)?;
-            agree(path("gain"), self.gains[i], channel.gain, channel.gain.abs())?;
-            agree(path("offset"), self.offsets[i], channel.offset, channel.offset.abs())?;
+            agree(&path("delay"), delay.0, channel.delay.0, (self.fast_period + delay).0)?;
+            agree(&path("gain"), self.gains[i], channel.gain, channel.gain.abs())?;
+            agree(&path("offset"), self.offsets[i], channel.offset, channel.offset.abs())?;
         }
         match (&self.fixed_point, &spec.design.bits) {
             // Of a loss they are the most.
             (Some(FixedPoint { bits, .. }), Some(asked))
                 if bits != asked && spec.design.loss_db.is_none() =>
             {
-                refuse(
-                    "spec.design.bits",
-                    BankProblem::WordsDiffer { bank: bits.clone(), spec: asked.clone() },
-                )
+                let rule = format!(
+                    "the bank's integers have {bits}, its spec asks for {asked}; design the bank again, or set spec to null"
+                );
+                Err(refused("spec.design.bits", rule))
             }
             _ => Ok(()),
         }
     }
 }
 
-fn agree(path: impl Into<String>, bank: f64, spec: f64, size: f64) -> Checked {
+fn agree(path: &str, bank: f64, spec: f64, size: f64) -> Checked {
     if (bank - spec).abs() <= SPEC_TOLERANCE * size {
         return Ok(());
     }
-    refuse(path, BankProblem::SpecDiffers { bank, spec })
+    let rule = format!(
+        "the bank says {}, its spec says {}; they must agree, design the bank again or set spec to null",
+        Number(bank),
+        Number(spec)
+    );
+    Err(refused(path, rule))
 }
 
 fn check_delays(delays: &[Seconds], fast_period: Seconds) -> Checked {
-    if !(1..=MAX_CHANNELS).contains(&delays.len()) {
-        let rule = format!("a bank has 1 to {MAX_CHANNELS} channels");
-        return out_of_range("channels", delays.len() as f64, "channels", rule);
-    }
+    check_channel_count(delays.len()).at("channels")?;
     let most = MAX_BANK_LATENCY as f64;
     match delays.iter().position(|delay| !(0.0..=most).contains(&delay.in_fast_periods(fast_period).0)) {
         Some(i) => {
@@ -282,7 +273,8 @@ fn check_sizes(path: &str, values: &[f64]) -> Checked {
         let rule = format!("coefficients are at most {MAX_ENTRY:e} in size; scale the filters");
         return out_of_range(path, value, "(coefficient)", rule);
     }
-    refuse(path, BankProblem::NotFinite { value })
+    let rule = "is not a finite number and has no JSON; the design that made it has failed";
+    Err(refused(&path, format!("{value} {rule}")))
 }
 
 fn check_block(block: &StateSpace, ratio: usize, channels: usize) -> Checked {

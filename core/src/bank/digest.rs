@@ -13,9 +13,10 @@ use sha2::{Digest as _, Sha256};
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::{BankError, BankProblem};
-use crate::messages::of_json;
-use crate::spec::Refusal;
+use crate::messages::Quoted;
+use crate::spec::{Refusal, refused};
+
+use super::file::syntax;
 
 /// In front of the digits.
 const ALGORITHM: &str = "sha256:";
@@ -23,21 +24,22 @@ const ALGORITHM: &str = "sha256:";
 /// Compares the digest of a bank file with its content. Returns false if the file has no digest.
 ///
 /// # Errors
-/// [`BankError`] if the text is not JSON, the digest is malformed, or the digest does not match the
+/// [`Refusal`] if the text is not JSON, the digest is malformed, or the digest does not match the
 /// content.
-pub fn check_digest(text: &str, file_name: &str) -> Result<bool, BankError> {
+pub fn check_digest(text: &str, file_name: &str) -> Result<bool, Refusal> {
     checked(text.trim_start_matches('\u{feff}')).map_err(|error| error.in_file(file_name))
 }
 
-fn checked(text: &str) -> Result<bool, BankError> {
-    let syntax = |error: serde_json::Error| -> BankError {
-        Refusal::new("", BankProblem::Syntax { message: of_json(&error.to_string()) })
-    };
-    let document: Value = serde_json::from_str(text).map_err(syntax)?;
-    let stated = Option::<String>::deserialize(&document["digest"]).map_err(syntax)?;
+fn checked(text: &str) -> Result<bool, Refusal> {
+    let document: Value = serde_json::from_str(text).map_err(|error| syntax(&error))?;
+    let stated = Option::<String>::deserialize(&document["digest"]).map_err(|error| syntax(&error))?;
     let Some(stated) = stated else { return Ok(false) };
     check_form(&stated)?;
-    if stated == digest(&document) { Ok(true) } else { Err(Refusal::new("digest", BankProblem::Altered)) }
+    if stated == digest(&document) {
+        return Ok(true);
+    }
+    let rule = "it is not the digest of this content: something in the file was altered; take the original, or design the bank again";
+    Err(refused("digest", rule))
 }
 
 /// The digest of a document as the file writes it.
@@ -49,12 +51,13 @@ pub(super) fn digest(document: &Value) -> String {
 }
 
 /// Refuses a text that has not the form of a digest.
-pub(super) fn check_form(text: &str) -> Result<(), BankError> {
+pub(super) fn check_form(text: &str) -> Result<(), Refusal> {
     let digits = text.strip_prefix(ALGORITHM).unwrap_or_default();
     if digits.len() == 64 && digits.bytes().all(|b| matches!(b, b'0'..=b'9' | b'a'..=b'f')) {
         return Ok(());
     }
-    Err(Refusal::new("digest", BankProblem::Digest { found: text.to_owned() }))
+    let rule = "is no digest, which is sha256: with 64 hexadecimal digits; leave it out";
+    Err(refused("digest", format!("\"{}\" {rule}", Quoted(text))))
 }
 
 fn absorb(hasher: &mut Sha256, value: &Value, left_out: &[&str]) {

@@ -3,14 +3,13 @@
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 
+use super::check::check_length;
 use super::digest::{check_form, digest};
-use super::{
-    Bank, BankError, BankProblem, FORMAT, FixedPoint, Gamma, Proof, StateSpace, SynthesisFilters, VERSION,
-    layout,
-};
-use crate::messages::of_json;
+use super::{Bank, FORMAT, FixedPoint, Gamma, Proof, StateSpace, SynthesisFilters, VERSION, layout};
+use crate::messages::{Quoted, of_json};
 use crate::spec::{
     At, DesignOverrides, Method, OneOrEach, Refusal, Spec, SpecProblem, SpecTable, no_models, refusal,
+    refused,
 };
 use crate::units::Seconds;
 
@@ -95,8 +94,8 @@ impl Bank {
     /// Reads a bank file's text; `file_name` is used only in messages.
     ///
     /// # Errors
-    /// [`BankError`] naming the JSON place, the rule and the remedy for the first thing that is wrong.
-    pub fn from_json(text: &str, file_name: &str) -> Result<Self, BankError> {
+    /// [`Refusal`] naming the JSON place, the rule and the remedy for the first thing that is wrong.
+    pub fn from_json(text: &str, file_name: &str) -> Result<Self, Refusal> {
         // Some editors put a byte-order mark in front.
         let text = text.trim_start_matches('\u{feff}');
         let bank = parse(text).and_then(BankTable::bank);
@@ -107,8 +106,8 @@ impl Bank {
     /// digits as are needed to read back the same bits.
     ///
     /// # Errors
-    /// [`BankError`] as [`Bank::check`]; in particular for NaN and infinity, which JSON cannot represent.
-    pub fn to_json(&self) -> Result<String, BankError> {
+    /// [`Refusal`] as [`Bank::check`]; in particular for NaN and infinity, which JSON cannot represent.
+    pub fn to_json(&self) -> Result<String, Refusal> {
         self.check()?;
         layout::text(&BankTable { digest: Some(self.digest()?), ..self.table() })
     }
@@ -117,10 +116,10 @@ impl Bank {
     ///
     /// # Errors
     /// As [`Bank::to_json`].
-    pub fn digest(&self) -> Result<String, BankError> {
+    pub fn digest(&self) -> Result<String, Refusal> {
         serde_json::to_value(self.table())
             .map(|document| digest(&document))
-            .map_err(|error| Refusal::new("", BankProblem::Syntax { message: error.to_string() }))
+            .map_err(|error| unreadable(&error.to_string()))
     }
 
     fn table(&self) -> BankTable<&Spec> {
@@ -160,43 +159,61 @@ impl Bank {
     }
 }
 
-fn parse(text: &str) -> Result<BankTable<SpecTable>, BankError> {
+fn parse(text: &str) -> Result<BankTable<SpecTable>, Refusal> {
     serde_json::from_str(text).or_else(|_| {
         // Only a file that is refused is read again for the path of the fault.
         let reader = &mut serde_json::Deserializer::from_str(text);
         serde_path_to_error::deserialize(reader).map_err(|error| {
             let header: Result<Header, _> = serde_json::from_str(text);
-            header.map_or(Ok(()), Header::check).err().unwrap_or_else(|| refused(&error))
+            header.map_or(Ok(()), Header::check).err().unwrap_or_else(|| refused_at(&error))
         })
     })
 }
 
-fn refused(error: &serde_path_to_error::Error<serde_json::Error>) -> BankError {
-    let message = error.inner().to_string();
+fn refused_at(error: &serde_path_to_error::Error<serde_json::Error>) -> Refusal {
     match error.inner().is_data() {
-        true => refusal(&message, &error.path().to_string()).map(BankProblem::Value),
-        false => Refusal::new("", BankProblem::Syntax { message: of_json(&message) }),
+        true => refusal(&error.inner().to_string(), &error.path().to_string()),
+        false => syntax(error.inner()),
     }
 }
 
+/// A text that is not JSON.
+pub(super) fn syntax(error: &serde_json::Error) -> Refusal {
+    unreadable(&of_json(&error.to_string()))
+}
+
+/// A text that no bank has.
+pub(super) fn unreadable(message: &str) -> Refusal {
+    let remedy = "is this a bank written by `hybank design`, and is it whole?";
+    refused("", format!("{}; {remedy}", Quoted(message)))
+}
+
 impl Header {
-    fn check(self) -> Result<(), BankError> {
+    fn check(self) -> Result<(), Refusal> {
         if self.format != FORMAT {
-            return Err(Refusal::new("format", BankProblem::Format { found: self.format }));
+            let rule = format!(
+                "the file says format \"{}\", a bank says \"{FORMAT}\"; give a file written by `hybank design`",
+                Quoted(&self.format)
+            );
+            return Err(refused("format", rule));
         }
         if self.version != VERSION {
-            return Err(Refusal::new("version", BankProblem::Version { found: self.version }));
+            let rule = format!(
+                "the bank has version {}, this program reads version {VERSION}; design it again, or update the program",
+                self.version
+            );
+            return Err(refused("version", rule));
         }
         Ok(())
     }
 }
 
 impl BankTable<SpecTable> {
-    fn bank(self) -> Result<Bank, BankError> {
+    fn bank(self) -> Result<Bank, Refusal> {
         Header { format: self.format, version: self.version }.check()?;
         self.digest.as_deref().map_or(Ok(()), check_form)?;
         let spec = self.spec.map(|table| table.spec(DesignOverrides::default(), &no_models));
-        let spec = spec.transpose().map_err(|error| error.inside("spec").map(BankProblem::Value))?;
+        let spec = spec.transpose().map_err(|error| error.inside("spec"))?;
         let of_channels = |value: fn(&ChannelTable) -> f64| self.channels.iter().map(value).collect();
         Ok(Bank {
             spec,
@@ -217,7 +234,7 @@ impl BankTable<SpecTable> {
 }
 
 /// Either every channel has taps, or there is a state-space block.
-fn filters(block: Option<StateSpace>, channels: Vec<ChannelTable>) -> Result<SynthesisFilters, BankError> {
+fn filters(block: Option<StateSpace>, channels: Vec<ChannelTable>) -> Result<SynthesisFilters, Refusal> {
     let with_taps = channels.iter().position(|channel| channel.taps.is_some());
     match (block, with_taps) {
         (Some(block), None) => Ok(SynthesisFilters::StateSpace(block)),
@@ -230,7 +247,7 @@ fn filters(block: Option<StateSpace>, channels: Vec<ChannelTable>) -> Result<Syn
             let lists = channels.into_iter().enumerate().map(|(i, channel)| {
                 channel.tap_lists().map_err(|error| error.inside(&format!("channels[{i}]")))
             });
-            let lists = lists.collect::<Result<Vec<_>, BankError>>()?;
+            let lists = lists.collect::<Result<Vec<_>, Refusal>>()?;
             Ok(SynthesisFilters::Fir(lists.into_iter().flatten().collect()))
         }
     }
@@ -238,15 +255,12 @@ fn filters(block: Option<StateSpace>, channels: Vec<ChannelTable>) -> Result<Syn
 
 impl ChannelTable {
     /// The taps of each sample of a frame.
-    fn tap_lists(self) -> Result<Vec<Vec<f64>>, BankError> {
+    fn tap_lists(self) -> Result<Vec<Vec<f64>>, Refusal> {
         let remedy = "give the taps of every channel, or a state_space for all";
         let missing = SpecProblem::MissingKey { key: "taps", remedy };
         let TapLists(lists) = self.taps.ok_or(missing).at("")?;
-        let (found, expected, unit) = (lists.len(), self.samples.unwrap_or(1), "tap lists");
         let rule = "a converter with several samples per frame has a list of taps for each of them";
-        match found == expected {
-            true => Ok(lists),
-            false => Err(Refusal::new("taps", BankProblem::Length { found, expected, unit, rule })),
-        }
+        check_length("taps", lists.len(), self.samples.unwrap_or(1), "tap lists", rule)?;
+        Ok(lists)
     }
 }

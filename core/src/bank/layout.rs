@@ -5,17 +5,16 @@ use std::io;
 use serde::Serialize;
 use serde_json::ser::Formatter;
 
-use super::{BankError, BankProblem};
+use super::file::unreadable;
 use crate::spec::Refusal;
 
 /// The text of a document.
-pub(super) fn text(document: &impl Serialize) -> Result<String, BankError> {
+pub(super) fn text(document: &impl Serialize) -> Result<String, Refusal> {
     let mut bytes = Vec::new();
     let mut serializer = serde_json::Serializer::with_formatter(&mut bytes, Indented::default());
-    let unwritable = |message: String| Refusal::new("", BankProblem::Syntax { message });
-    document.serialize(&mut serializer).map_err(|e| unwritable(e.to_string()))?;
+    document.serialize(&mut serializer).map_err(|error| unreadable(&error.to_string()))?;
     bytes.push(b'\n');
-    String::from_utf8(bytes).map_err(|e| unwritable(e.to_string()))
+    String::from_utf8(bytes).map_err(|error| unreadable(&error.to_string()))
 }
 
 /// Objects over several lines, lists on one.

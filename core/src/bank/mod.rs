@@ -9,7 +9,6 @@
 
 mod check;
 mod digest;
-mod error;
 mod file;
 mod layout;
 mod proof;
@@ -17,7 +16,6 @@ mod taps;
 
 pub use check::MAX_BANK_LATENCY;
 pub use digest::check_digest;
-pub use error::{BankError, BankProblem};
 pub use proof::{BoxProof, Certificate, GainWitness, NormBound, Proof};
 pub use taps::FixedPoint;
 

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::spec::WordLengths;
+use crate::spec::{Refusal, WordLengths};
 use crate::units::Seconds;
 
 fn spec() -> Spec {
@@ -124,7 +124,7 @@ fn the_digest_sees_the_content_and_not_the_layout() {
         ("1.2,", "1.3,"),
     ] {
         let error = check_digest(&FIR_TEXT.replacen(from, to, 1), "b.json").unwrap_err();
-        assert_eq!((error.path(), error.problem()), ("digest", &BankProblem::Altered), "{error}");
+        assert!(error.path() == "digest" && error.to_string().contains("was altered"), "{error}");
     }
     let at = FIR_TEXT.find(",\n  \"digest\"").unwrap();
     assert_eq!(check_digest(&format!("{}}}", &FIR_TEXT[..at]), "b.json"), Ok(false));
@@ -247,7 +247,7 @@ fn integer_taps_that_could_not_be_read_back_are_not_written() {
     }
 }
 
-fn refused(text: &str) -> BankError {
+fn refused(text: &str) -> Refusal {
     match Bank::from_json(text, "b.json") {
         Ok(bank) => panic!("this must not read: {text}\n{bank:?}"),
         Err(error) => error,
@@ -368,7 +368,8 @@ fn deep_nesting_is_an_error() {
     for key in ["format", "channels", "meta"] {
         let text = format!("{{\"{key}\": {}1{}}}", "[".repeat(100_000), "]".repeat(100_000));
         assert!(!refused(&text).to_string().is_empty());
-        assert!(matches!(check_digest(&text, "b.json").unwrap_err().problem(), BankProblem::Syntax { .. }));
+        let error = check_digest(&text, "b.json").unwrap_err().to_string();
+        assert!(error.contains("is this a bank written by"), "{error}");
     }
 }
 
@@ -434,7 +435,7 @@ fn gains_and_offsets_survive_the_file_and_are_in_its_digest() {
         // In the spec and in the channel, so that they agree.
         assert!(Bank::from_json(&altered, "b.json").is_ok(), "{from}");
         let error = check_digest(&altered, "b.json").unwrap_err();
-        assert_eq!((error.path(), error.problem()), ("digest", &BankProblem::Altered), "{from}");
+        assert!(error.path() == "digest" && error.to_string().contains("was altered"), "{from}");
     }
 }
 

@@ -7,7 +7,7 @@ use super::grouped::GroupedInput;
 use super::lost::LostInInput;
 use super::open::InputSource;
 use super::pipe::is_file;
-use super::stall::Wait;
+use super::stall::{PATIENCE, Wait};
 #[cfg(target_os = "linux")]
 use super::stdin_reader::read_stdin;
 use super::{InputFault, IoError, StreamHeader};
@@ -130,7 +130,7 @@ impl Input {
                         Err(_) => return Err(IoError::ReaderDied { file: self.name.clone() }),
                     },
                     recv(stop) -> _ => break None,
-                    default(wait.patience()) => wait.go_on(),
+                    default(PATIENCE) => wait.go_on(),
                 }
             },
             #[cfg(target_os = "linux")]

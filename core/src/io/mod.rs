@@ -18,7 +18,7 @@
 //! writer.write(&[0x00, 0x40, 0x00, 0xC0])?;
 //! commit_all(writer.finish()?)?;
 //!
-//! let mut reader = MultiReader::start(&[path.clone()], ReadOptions::files())?;
+//! let mut reader = MultiReader::start(&[path.clone()], ReadOptions::files(), &mut |_| {})?;
 //! assert!(reader.headers().all(|(_, header)| header.rate == Some(48_000.0)));
 //! assert_eq!(OfflineSamples::read(&mut reader, 1000)?.channels, [[0.5, -0.5]]);
 //! # std::fs::remove_file(path)?;
@@ -76,6 +76,6 @@ pub use rails::rails_of;
 pub use read_options::{BLOCK_BYTES, ReadOptions, TimeInterleaving, Until};
 pub use sample_writer::{Container, OutputHeader, SampleWriter};
 pub use sigmf::{SigmfAnnotation, SigmfCapture, SigmfGlobal, SigmfMeta, is_sigmf, sigmf_files};
-pub use stall::{Stall, StallWatch};
+pub use stall::{OnStall, Stall};
 pub use stream_header::{Coding, StreamHeader, is_same_rate};
 pub use timestamps::{MAX_LOST, MAX_LOST_AT_ONCE};

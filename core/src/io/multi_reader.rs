@@ -10,8 +10,8 @@ use super::lost::{LostInInput, LostSamples};
 use super::notes::{OutputNotes, Placement};
 use super::open::InputSource;
 use super::pipe::refuse_shared_pipes;
-use super::stall::Wait;
-use super::{InputWarning, IoError, PcmFrames, ReadOptions, StallWatch, StreamHeader, Until};
+use super::stall::{OnStall, Wait};
+use super::{InputWarning, IoError, PcmFrames, ReadOptions, StreamHeader, Until};
 use crossbeam_channel::Receiver;
 use std::path::PathBuf;
 
@@ -41,7 +41,6 @@ pub struct MultiReader {
     inputs: Vec<Input>,
     stop: Receiver<()>,
     until: Until,
-    stalls: Option<StallWatch>,
     max_lost: u64,
     /// Number of the earliest frame at the converter.
     origin: u64,
@@ -51,15 +50,20 @@ pub struct MultiReader {
 }
 
 impl MultiReader {
-    /// Starts reading and waits for the headers. `-` is standard input. A name that ends in sigmf-meta or
-    /// sigmf-data is a SigMF recording, everything else is as [`ReadOptions::coding`] says. Time counts
-    /// from the earliest sample whose number is known: inputs that join late begin with lost samples.
+    /// Starts reading and waits for the headers; tells `on_stall` of those that do not come. `-` is standard
+    /// input. A name that ends in sigmf-meta or sigmf-data is a SigMF recording, everything else is as
+    /// [`ReadOptions::coding`] says. Time counts from the earliest sample whose number is known: inputs that
+    /// join late begin with lost samples.
     ///
     /// # Errors
     /// [`IoError`] for an input that cannot be read or is not plain PCM, for a pipe that is given twice,
     /// for lost samples that do not fit the inputs or are more than [`ReadOptions::max_lost`], and for a
     /// thread that cannot be started.
-    pub fn start(paths: &[PathBuf], options: ReadOptions<'_>) -> Result<Self, IoError> {
+    pub fn start(
+        paths: &[PathBuf],
+        options: ReadOptions<'_>,
+        on_stall: OnStall<'_>,
+    ) -> Result<Self, IoError> {
         if let Some(path) = paths.get(MOST_INPUTS) {
             let problem =
                 format!("it is one of {} inputs; at most {MOST_INPUTS} are read together", paths.len());
@@ -88,11 +92,11 @@ impl MultiReader {
                 .collect::<Result<_, _>>()?,
         };
         let ReadOptions { until, max_lost, lost, .. } = options;
-        let (stalls, stop) = (options.stalls.cloned(), crossbeam_channel::never());
-        let mut reader = Self { inputs, stop, until, stalls, max_lost, origin: 0, ready: 0, consumed: 0 };
+        let stop = crossbeam_channel::never();
+        let mut reader = Self { inputs, stop, until, max_lost, origin: 0, ready: 0, consumed: 0 };
         for i in 0..paths.len() {
             if reader.inputs[i].sends_header() {
-                reader.receive(i)?;
+                reader.receive(i, on_stall)?;
             }
         }
         reader.refuse_some_complex()?;
@@ -134,15 +138,15 @@ impl MultiReader {
         grouped.filter_map(|input| Some(input.aligned.header.promised? / input.per_frame() as u64)).min()
     }
 
-    /// Waits until every input has a frame.
+    /// Waits until every input has a frame, and tells `on_stall` of those that give none.
     ///
     /// # Errors
     /// The system's refusal to read one of them, or [`IoError::ReaderDied`].
-    pub fn wait(&mut self) -> Result<Arrival, IoError> {
+    pub fn wait(&mut self, on_stall: OnStall<'_>) -> Result<Arrival, IoError> {
         for i in 0..self.inputs.len() {
             self.inputs[i].grouped.gather(false);
             while self.inputs[i].grouped.waits() {
-                if !self.receive(i)? {
+                if !self.receive(i, on_stall)? {
                     return Ok(Arrival::Stopped);
                 }
                 self.inputs[i].grouped.gather(false);
@@ -203,11 +207,11 @@ impl MultiReader {
     }
 
     /// Waits for the next message of input i; false if a stop was asked for first.
-    fn receive(&mut self, i: usize) -> Result<bool, IoError> {
+    fn receive(&mut self, i: usize, on_stall: OnStall<'_>) -> Result<bool, IoError> {
         let before: usize = self.inputs[..i].iter().map(|input| input.grouped.aligned.header.channels).sum();
         let input = &mut self.inputs[i];
-        let channels = before + 1..=before + input.grouped.aligned.header.channels;
-        let wait = Wait::new(self.stalls.as_ref(), &input.name, channels);
+        let channels = [before + 1, before + input.grouped.aligned.header.channels];
+        let wait = Wait::new(on_stall, &input.name, channels);
         input.receive(&self.stop, wait)
     }
 

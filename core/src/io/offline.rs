@@ -52,7 +52,7 @@ impl OfflineSamples {
         let promised = reader.promised_frames().and_then(|frames| usize::try_from(frames).ok());
         reserve(&mut channels, promised.unwrap_or_default().min(most))?;
         loop {
-            match reader.wait()? {
+            match reader.wait(&mut |_| {})? {
                 Arrival::Frames(count) => {
                     let known = channels.first().map_or(0, Vec::len);
                     let room = most - known;
@@ -68,10 +68,10 @@ impl OfflineSamples {
         }
     }
 
-    /// From frames in memory.
-    pub fn of_frames(frames: &[PcmFrames<'_>]) -> Self {
+    /// From at most `most` frames in memory.
+    pub fn of_frames(frames: &[PcmFrames<'_>], most: usize) -> Self {
         let mut channels = vec![Vec::new(); frames.iter().map(|part| part.channels).sum()];
-        append(frames, usize::MAX, &mut channels);
+        append(frames, most, &mut channels);
         Self { channels, is_cut: false }
     }
 }

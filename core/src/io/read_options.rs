@@ -1,7 +1,7 @@
 //! Settings of the reading of several inputs.
 
 use super::timestamps::MAX_LOST;
-use super::{Coding, LostSamples, StallWatch};
+use super::{Coding, LostSamples};
 use crate::quantity::FullScale;
 
 /// Bytes of a block that suit one thread.
@@ -43,8 +43,6 @@ pub struct ReadOptions<'a> {
     pub until: Until,
     /// The most bytes of an input that are read at a time; less if there are many inputs.
     pub block_bytes: usize,
-    /// Who is to know of inputs that are waited for.
-    pub stalls: Option<&'a StallWatch>,
 }
 
 impl ReadOptions<'_> {
@@ -61,7 +59,6 @@ impl ReadOptions<'_> {
             max_lost: MAX_LOST,
             until: Until::Shortest,
             block_bytes: BLOCK_BYTES,
-            stalls: None,
         }
     }
 }

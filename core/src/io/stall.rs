@@ -1,44 +1,45 @@
 //! Inputs that give nothing for a while.
 
+use crate::messages::Quoted;
 use std::fmt;
-use std::ops::RangeInclusive;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Without a watch a wait is cut into pieces of this length, to no effect.
-const LONG: Duration = Duration::from_secs(3600);
+/// The time without a sample after which an input counts as stalled.
+pub(super) const PATIENCE: Duration = Duration::from_secs(1);
 
 /// An input that is waited for, or that was and goes on.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Stall {
     /// Name of the input.
     pub input: String,
-    /// Its channels among those of all inputs, from 1.
-    pub channels: RangeInclusive<usize>,
-    /// How long it has been waited for.
-    pub waited: Duration,
+    /// The first and the last of its channels among those of all inputs, from 1.
+    pub channels: [usize; 2],
+    /// How long it has been waited for, in seconds, to the millisecond.
+    pub seconds: f64,
     /// It goes on.
+    #[serde(skip)]
     pub is_over: bool,
 }
 
-/// Where to report stalls, and after what time.
-#[derive(Clone)]
-pub struct StallWatch {
-    /// The time without a sample after which an input counts as stalled.
-    pub patience: Duration,
-    /// Called once when a stall begins and once when it is over. The samples wait for it.
-    pub report: Arc<dyn Fn(&Stall) + Send + Sync>,
-}
-
-impl fmt::Debug for StallWatch {
+impl fmt::Display for Stall {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("StallWatch").field("patience", &self.patience).finish_non_exhaustive()
+        let [first, last] = self.channels;
+        let channels =
+            if first == last { format!("channel {first}") } else { format!("channels {first} to {last}") };
+        let input = Quoted(&self.input);
+        match self.is_over {
+            true => write!(f, "{channels} ({input}) goes on after {:.1} s", self.seconds),
+            false => write!(f, "waiting for {channels} ({input})"),
+        }
     }
 }
 
+/// Called once when a stall begins and once when it is over. The samples wait for it.
+pub type OnStall<'a> = &'a mut dyn FnMut(&Stall);
+
 /// One wait for one input.
 pub(super) struct Wait<'a> {
-    watch: Option<&'a StallWatch>,
+    report: OnStall<'a>,
     /// The input, as it will be reported.
     stall: Stall,
     began: Instant,
@@ -46,14 +47,9 @@ pub(super) struct Wait<'a> {
 }
 
 impl<'a> Wait<'a> {
-    pub(super) fn new(watch: Option<&'a StallWatch>, input: &str, channels: RangeInclusive<usize>) -> Self {
-        let stall = Stall { input: input.to_owned(), channels, waited: Duration::ZERO, is_over: false };
-        Self { watch, stall, began: Instant::now(), is_reported: false }
-    }
-
-    /// The time after which [`Wait::go_on`] is due.
-    pub(super) fn patience(&self) -> Duration {
-        self.watch.map_or(LONG, |watch| watch.patience)
+    pub(super) fn new(report: OnStall<'a>, input: &str, channels: [usize; 2]) -> Self {
+        let stall = Stall { input: input.to_owned(), channels, seconds: 0.0, is_over: false };
+        Self { report, stall, began: Instant::now(), is_reported: false }
     }
 
     /// Nothing has come yet.
@@ -68,41 +64,40 @@ impl<'a> Wait<'a> {
     }
 
     fn go_on_after(&mut self, waited: Duration) {
-        self.stall.waited = waited;
-        if let Some(watch) = self.watch.filter(|watch| !self.is_reported && waited >= watch.patience) {
-            (watch.report)(&self.stall);
+        if !self.is_reported && waited >= PATIENCE {
             self.is_reported = true;
+            self.report(waited);
         }
     }
 
     fn end_after(mut self, waited: Duration) {
-        if let Some(watch) = self.watch.filter(|_| self.is_reported) {
-            (self.stall.waited, self.stall.is_over) = (waited, true);
-            (watch.report)(&self.stall);
+        if self.is_reported {
+            self.stall.is_over = true;
+            self.report(waited);
         }
+    }
+
+    fn report(&mut self, waited: Duration) {
+        self.stall.seconds = waited.as_millis() as f64 / 1e3;
+        (self.report)(&self.stall);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::Mutex;
 
     #[test]
     fn a_stall_is_reported_once_and_its_end_once() {
-        let reported = Arc::new(Mutex::new(Vec::new()));
-        let list = Arc::clone(&reported);
-        let report = Arc::new(move |stall: &Stall| list.lock().unwrap().push((stall.waited, stall.is_over)));
-        let watch = StallWatch { patience: Duration::from_millis(100), report };
-        let wait = |steps: u64, end: u64| {
-            let mut wait = Wait::new(Some(&watch), "x", 2..=2);
-            (1..=steps).for_each(|k| wait.go_on_after(Duration::from_millis(50 * k)));
+        let mut reported = Vec::new();
+        let mut wait = |steps: u64, end: u64| {
+            let mut report = |stall: &Stall| reported.push(stall.to_string());
+            let mut wait = Wait::new(&mut report, "x", [2, 2]);
+            (1..=steps).for_each(|k| wait.go_on_after(Duration::from_millis(500 * k)));
             wait.end_after(Duration::from_millis(end));
         };
-        wait(1, 99);
-        assert!(reported.lock().unwrap().is_empty());
-        wait(5, 270);
-        let times = [(100, false), (270, true)].map(|(time, over)| (Duration::from_millis(time), over));
-        assert_eq!(*reported.lock().unwrap(), times);
+        wait(1, 990);
+        wait(5, 2700);
+        assert_eq!(reported, ["waiting for channel 2 (x)", "channel 2 (x) goes on after 2.7 s"]);
     }
 }

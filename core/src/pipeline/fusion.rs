@@ -84,6 +84,16 @@ impl<'a> Fusion<'a> {
         &self.streams[0]
     }
 
+    /// One stream, or those of the real and the imaginary parts.
+    pub(super) fn streams(&self) -> &[Stream] {
+        &self.streams
+    }
+
+    /// Goes on with other streams of the same plan.
+    pub(super) fn set_streams(&mut self, streams: Vec<Stream>) {
+        self.streams = streams;
+    }
+
     /// 1, or 2 for complex samples.
     pub(super) fn parts(&self) -> usize {
         self.streams.len()

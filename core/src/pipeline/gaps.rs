@@ -7,6 +7,7 @@
 
 use crate::bank::{Bank, FrameLayout, FrameSample, SynthesisFilters};
 use crate::runtime::{Input, Isa};
+use std::fmt;
 use std::ops::Range;
 
 /// Maximum number of gaps that a report lists; further gaps are only counted, so that memory stays bounded.
@@ -22,6 +23,13 @@ pub struct Gap {
     pub first: u64,
     /// Samples that are missing.
     pub length: u64,
+}
+
+impl fmt::Display for Gap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { channel, first, length } = self;
+        write!(f, "gap: channel {channel}, sample {first}, {length} missing")
+    }
 }
 
 /// The gaps of a run.

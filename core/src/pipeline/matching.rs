@@ -7,7 +7,7 @@
 //! let path = std::env::temp_dir().join(format!("hybank-matching-{}.raw", std::process::id()));
 //! std::fs::write(&path, [0; 16])?;
 //! let options = ReadOptions { coding: Coding::Raw(PcmFormat::S16Le), ..ReadOptions::files() };
-//! let reader = MultiReader::start(&[path.clone()], options)?;
+//! let reader = MultiReader::start(&[path.clone()], options, &mut |_| {})?;
 //! let bank = Bank::bare(SynthesisFilters::Fir(vec![vec![1.0], vec![0.5]]), 2);
 //! let refused = check_channels(&bank.layout(), "bank.json", &reader);
 //! assert!(matches!(refused, Err(InputMismatch::Channels { wanted: 2, given: 1, .. })));

@@ -35,6 +35,7 @@ pub mod matching;
 mod offline;
 mod outcome;
 mod outputs;
+mod state;
 mod streaming;
 
 pub use fusion::{DroppedLatency, Settings};

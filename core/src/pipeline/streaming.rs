@@ -26,12 +26,12 @@ type Write<'w> = &'w mut dyn FnMut(Block<'_>) -> Result<(), IoError>;
 /// Runs a bank on frames as they arrive: fills gaps, filters, drops the latency, encodes and counts.
 #[derive(Debug)]
 pub struct Pipeline<'a> {
-    fusion: Fusion<'a>,
+    pub(super) fusion: Fusion<'a>,
     format: PcmFormat,
     /// Frames of a step, at most.
     step: usize,
     samples: u64,
-    clipped: u64,
+    pub(super) clipped: u64,
     buffer: Vec<u8>,
 }
 
@@ -55,6 +55,11 @@ impl<'a> Pipeline<'a> {
     /// The plan.
     pub fn plan(&self) -> &Plan {
         self.fusion.stream().plan()
+    }
+
+    /// Frames so far, with those that a flush adds.
+    pub fn position(&self) -> u64 {
+        self.fusion.stream().position()
     }
 
     /// Output samples so far.

@@ -8,21 +8,21 @@ use crate::messages::{Location, Number, Quoted};
 ///
 /// Displays as `file:line:column: path: problem`, with the offending line below where it is known.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Refusal<P> {
-    inner: Box<Inner<P>>,
+pub struct Refusal {
+    inner: Box<Inner>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-struct Inner<P> {
+struct Inner {
     file: String,
     path: String,
     location: Option<Location>,
     overridden: bool,
-    problem: P,
+    problem: SpecProblem,
 }
 
 /// A spec that was refused.
-pub type SpecError = Refusal<SpecProblem>;
+pub type SpecError = Refusal;
 
 /// The rule that a spec violates, with the offending value and the remedy.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -139,10 +139,10 @@ fn channel_from_one(part: &str) -> Option<String> {
     matches!(list, "channel" | "channels").then(|| format!("channel {}{rest}", index + 1))
 }
 
-impl<P> Refusal<P> {
+impl Refusal {
     /// A problem with the value at a path of keys.
-    pub(crate) fn new(path: impl Into<String>, problem: impl Into<P>) -> Self {
-        let (file, path, problem) = (String::new(), path.into(), problem.into());
+    pub(crate) fn new(path: impl Into<String>, problem: SpecProblem) -> Self {
+        let (file, path) = (String::new(), path.into());
         Self { inner: Box::new(Inner { file, path, location: None, overridden: false, problem }) }
     }
 
@@ -171,10 +171,12 @@ impl<P> Refusal<P> {
         self
     }
 
-    /// The same with another problem.
-    pub(crate) fn map<Q>(self, other: impl FnOnce(P) -> Q) -> Refusal<Q> {
-        let Inner { file, path, location, overridden, problem } = *self.inner;
-        Refusal { inner: Box::new(Inner { file, path, location, overridden, problem: other(problem) }) }
+    /// The same with the tables that have an unknown key.
+    pub(super) fn with_homes(mut self, tables_with: fn(&str) -> Vec<&'static str>) -> Self {
+        if let SpecProblem::Unknown { what: "key", name, homes, .. } = &mut self.inner.problem {
+            *homes = tables_with(name);
+        }
+        self
     }
 
     /// The key, such as `fraction_bits`, if the problem is a value that overrides the one in the file.
@@ -198,14 +200,14 @@ impl<P> Refusal<P> {
     }
 
     /// The rule that is violated.
-    pub fn problem(&self) -> &P {
+    pub fn problem(&self) -> &SpecProblem {
         &self.inner.problem
     }
 }
 
-impl<P: fmt::Debug + fmt::Display> std::error::Error for Refusal<P> {}
+impl std::error::Error for Refusal {}
 
-impl<P: fmt::Display> fmt::Display for Refusal<P> {
+impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Inner { file, path, location, overridden, problem } = &*self.inner;
         if *overridden {

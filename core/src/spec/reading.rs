@@ -28,14 +28,14 @@ pub(super) fn of_toml<T: DeserializeOwned>(text: &str) -> Result<T, SpecError> {
 
 fn in_toml(text: &str, error: &toml::de::Error, path: &str) -> SpecError {
     let location = error.span().map(|span| Location::find(text, span));
-    refusal(error.message(), path).map(with_homes).located(location)
+    refusal(error.message(), path).with_homes(tables_with).located(location)
 }
 
 /// Reads data of any format; the path of keys says where a fault is.
 pub(super) fn of_data<'de, D: Deserializer<'de>, T: DeserializeOwned>(data: D) -> Result<T, SpecError> {
     serde_path_to_error::deserialize(data).map_err(|error| {
         let message = error.inner().to_string();
-        refusal(message.lines().next().unwrap_or_default(), &error.path().to_string()).map(with_homes)
+        refusal(message.lines().next().unwrap_or_default(), &error.path().to_string()).with_homes(tables_with)
     })
 }
 
@@ -55,14 +55,6 @@ pub(crate) fn refusal(message: &str, path: &str) -> SpecError {
     let table =
         if what == "key" { path.strip_suffix(&name).unwrap_or(path).trim_end_matches('.') } else { path };
     Refusal::new(table, SpecProblem::Unknown { what, name, nearest, homes: Vec::new(), known })
-}
-
-/// The same with the tables that have an unknown key.
-fn with_homes(mut problem: SpecProblem) -> SpecProblem {
-    if let SpecProblem::Unknown { what: "key", name, homes, .. } = &mut problem {
-        *homes = tables_with(name);
-    }
-    problem
 }
 
 /// The tables of a spec that have a key of this name.

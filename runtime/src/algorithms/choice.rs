@@ -87,7 +87,7 @@ pub(crate) enum ChosenAlgorithm {
 
 /// Transforms pay from so many lags K on, times N M / (N + M): sums take K N M multiply-adds per frame,
 /// transforms a time by N + M.
-const LONG: usize = 32;
+const LONG: usize = 96;
 
 impl Algorithm {
     /// All algorithms.
@@ -153,7 +153,7 @@ mod tests {
         // Measured: the direct algorithm wins at the first K, overlap-save at the second by a third at
         // least.
         for (n, m, short, long) in
-            [(1, 1, 16, 512), (2, 2, 8, 128), (4, 4, 4, 64), (8, 8, 4, 32), (16, 16, 2, 16)]
+            [(1, 1, 64, 512), (2, 2, 64, 128), (4, 4, 32, 64), (8, 8, 8, 32), (16, 16, 4, 16)]
         {
             assert!(!is_transformed(n, m, short, Algorithm::Auto), "N {n} M {m} K {short}");
             assert!(is_transformed(n, m, long, Algorithm::Auto), "N {n} M {m} K {long}");

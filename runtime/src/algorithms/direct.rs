@@ -286,13 +286,6 @@ impl<T: Sample> Filter for Direct<T> {
     }
 }
 
-impl<T: Sample> DirectState<T> {
-    /// The recent input becomes that of another stream, 0 where its filters do not look back so far.
-    pub(crate) fn copy_input(&mut self, other: &Self) {
-        self.history.fill(|age, channel| other.history.sample(age, channel));
-    }
-}
-
 /// Coefficient of the sample `element` samples before the last one of a frame.
 fn coefficient(taps: &[Vec<f64>], ratio: usize, element: usize, phase: usize) -> f64 {
     let n = taps.len();

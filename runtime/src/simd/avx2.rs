@@ -4,7 +4,6 @@ use super::avx2_frames::{
     diagonal_quads_f32, far_f32, far_f64, high, low, store_both, store_frames_f32, store_frames_f64,
     store_pairs, sum_frames_f32, sum_frames_f64,
 };
-use super::avx2_tile::{tile_f32, tile_f64};
 use super::vector::Vector;
 use std::arch::x86_64::*;
 
@@ -115,16 +114,6 @@ impl Vector for Avx2F32 {
     }
 
     #[inline(always)]
-    unsafe fn tile<const D: usize, const P: usize, const R: usize>(
-        x: *const f32,
-        stride: usize,
-        coefficients: *const f32,
-        steps: usize,
-    ) -> Option<[[Self; R]; P]> {
-        tile_f32::<_, D, P, R>(Self, x, stride, coefficients, steps)
-    }
-
-    #[inline(always)]
     unsafe fn load_i16(at: *const u8) -> Self {
         let wide = _mm256_cvtepi16_epi32(_mm_loadu_si128(at.cast()));
         Self(_mm256_mul_ps(_mm256_cvtepi32_ps(wide), _mm256_set1_ps(1.0 / 32768.0)))
@@ -205,15 +194,5 @@ impl Vector for Avx2F64 {
     unsafe fn store_halves([a, b, c, d]: [Self; 4], out: [*mut f64; 2], _: usize) {
         let (even, odd) = (far_f64(a.0, c.0), far_f64(b.0, d.0));
         store_both(_mm256_add_pd(even, _mm256_permute_pd::<0b0101>(odd)), out);
-    }
-
-    #[inline(always)]
-    unsafe fn tile<const D: usize, const P: usize, const R: usize>(
-        x: *const f64,
-        stride: usize,
-        coefficients: *const f64,
-        steps: usize,
-    ) -> Option<[[Self; R]; P]> {
-        tile_f64::<_, D, P, R>(Self, x, stride, coefficients, steps)
     }
 }

@@ -12,7 +12,7 @@
 //! Each kernel is one body that is generic over the vector type, compiled once for each instruction set.
 //! `unsafe` is needed for three things only: to call such a function after the processor was asked, to load
 //! and store vectors at addresses whose bounds the safe wrapper has checked once for the whole call, and for
-//! two pieces of assembly.
+//! two hints to the compiler in assembly.
 //!
 //! What an unsafe function asks for is said at the function, its trait or the head of its file, and not
 //! again in its body. There are two preconditions. *The set is there*: a function that is generic over a
@@ -35,7 +35,6 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx2_frames;
 #[cfg(target_arch = "x86_64")]
-mod avx2_tile;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod dispatch;

@@ -250,18 +250,6 @@ pub(crate) trait Vector: Copy {
         }
     }
 
-    /// The loop of a tile of P phases times R vectors, for tiles that have one in assembly: `steps` >= 1
-    /// steps from the newest window on, vectors `stride` samples apart. `None` leaves it to the compiler.
-    #[inline(always)]
-    unsafe fn tile<const D: usize, const P: usize, const R: usize>(
-        _x: *const Self::Sample,
-        _stride: usize,
-        _coefficients: *const Self::Sample,
-        _steps: usize,
-    ) -> Option<[[Self; R]; P]> {
-        None
-    }
-
     /// Samples from little-endian 16-bit integers, which are divided by 2^15.
     #[inline(always)]
     unsafe fn load_i16(at: *const u8) -> Self {

@@ -157,24 +157,6 @@ fn a_sample_that_is_not_finite_is_zero_after_the_subtraction() {
 }
 
 #[test]
-fn a_continued_stream_keeps_its_past_and_takes_the_new_offsets() {
-    let mut noise = Noise(9);
-    let plan = fir_bank(random_taps(2, 8, &mut noise), 2).plan(Options::default()).unwrap();
-    let x = samples(2, &mut noise);
-    let mut want = vec![0f32; FRAMES * 2];
-    Stream::new(&plan).process(&x, &mut want).unwrap();
-    let (first, second) = x.split_at(200);
-    let (old, new) = ([0.25, 0.5], [-0.125, 0.0]);
-    let mut stream = Stream::new(&plan.clone().with_offsets(&old).unwrap());
-    let mut got = vec![0f32; FRAMES * 2];
-    stream.process(&delivered(first, &old), &mut got).unwrap();
-    let mut next = Stream::new(&plan.with_offsets(&new).unwrap());
-    next.continue_from(&stream).unwrap();
-    next.process(&delivered(second, &new), &mut got[200..]).unwrap();
-    assert!(got == want);
-}
-
-#[test]
 fn offsets_that_do_not_fit_are_refused() {
     let plan = || Plan::from_taps(&[vec![1.0], vec![1.0]], 1, 0, Options::default()).unwrap();
     let refused = plan().with_offsets(&[0.5]).unwrap_err();

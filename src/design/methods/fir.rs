@@ -110,5 +110,5 @@ fn judged(
     let found = exchange.optimise()?;
     let taps = impulse_responses(&found.taps, length);
     let peak = plant.fir_norm(&taps)?;
-    Ok(Evaluated { taps, estimate: found.peaks.estimate, peak })
+    Ok(Evaluated { taps, estimate: found.estimate, peak })
 }

@@ -1,11 +1,12 @@
 //! Gamma-iteration: the search for the least gamma for which the filtering Riccati equation has a solution.
 
 use super::filtering::{Filter, Innovations, RiccatiSolver, Trial};
-use super::{Filters, GAMMA_ACCURACY, Synthesis};
+use super::{GAMMA_ACCURACY, Synthesis};
+use crate::bank::SynthesisFilters;
 use crate::design::DesignError;
+use crate::design::filters::to_block;
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
-use crate::linalg::{self, Complex};
 use crate::lti::LtiError;
 use crate::lti::peak::{Peak, hinf_norm};
 use std::rc::Rc;
@@ -120,15 +121,6 @@ impl<'a> GammaIteration<'a> {
         if self.best.as_ref().is_none_or(|best| found.peak.gain < best.peak.gain) {
             self.best = Some(found);
         }
-    }
-
-    /// Whether the error of `filters`, at the frequency where the noncausal bound is attained, equals the
-    /// least error of any filter up to the accuracy.
-    pub(super) fn may_be_optimal(&self, filters: &Filter) -> Result<bool, DesignError> {
-        let error = self.plant.error_system(filters);
-        let response = error.response_at(Complex::from_polar(1.0, self.noncausal.frequency));
-        let gain = linalg::largest_singular_value(&response)?;
-        Ok(gain <= self.lower * (1.0 + GAMMA_ACCURACY) || self.is_negligible(gain))
     }
 
     /// Keeps the first of the mean-square optimal filters that is stable.
@@ -285,7 +277,7 @@ impl<'a> GammaIteration<'a> {
     pub(super) fn synthesis(&self, chosen: Evaluated) -> Synthesis {
         let Evaluated { filters, peak } = chosen;
         Synthesis {
-            filters: Filters::StateSpace(filters),
+            filters: SynthesisFilters::StateSpace(to_block(&filters)),
             peak,
             lower: self.lower.min(peak.gain),
             noncausal: self.noncausal.gain.min(peak.gain),

@@ -24,20 +24,8 @@ const NOISE_SHARES: [f64; 6] = [1.0, 0.5, 0.25, 0.1, 0.03, 0.01];
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
     let innovations = Innovations::in_all_coordinates(plant)?;
     let mut iteration = GammaIteration::new(plant, &innovations, &settings.stop)?;
-    let mut mean_square = innovations.iter().filter_map(|form| form.h2()).peekable();
-    // The mean-square optimum is usually either the worst-case optimum too or far from it. The error at one
-    // frequency distinguishes the two cases.
-    let promising =
-        mean_square.peek().map(|filters| iteration.may_be_optimal(filters)).transpose()? == Some(true);
-    if !promising {
-        iteration.try_the_lower_bound()?;
-    }
-    if !iteration.done() {
-        iteration.start_from(mean_square)?;
-    }
-    if promising {
-        iteration.try_the_lower_bound()?;
-    }
+    iteration.start_from(innovations.iter().filter_map(|form| form.h2()))?;
+    iteration.try_the_lower_bound()?;
     iteration.bisect()?;
     refine::<DoubleDouble>(plant, &mut iteration, MOST_STATES_AT_106_BITS)?;
     refine::<Float512>(plant, &mut iteration, MOST_STATES_AT_512_BITS)?;

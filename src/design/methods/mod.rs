@@ -26,9 +26,9 @@ pub(crate) use super::exchange::GAMMA_ACCURACY;
 use super::limits::Stop;
 use super::plant::LiftedPlant;
 use super::problem::Problem;
-use crate::lti::StateSpace;
+use crate::bank::SynthesisFilters;
 use crate::lti::peak::Peak;
-use crate::spec::{Method, Spec};
+use crate::spec::{ErrorBox, Method, Spec};
 use crate::units::FastPeriods;
 
 /// Settings of a method, in addition to the plant.
@@ -40,7 +40,7 @@ pub(crate) struct Settings {
     /// method's default.
     pub(crate) gamma_margin: Option<f64>,
     /// The errors that `fir` has to expect; `None` if there are none.
-    pub(crate) robust: Option<robust_fir::RobustProblem>,
+    pub(crate) robust: Option<ErrorBox>,
     /// For mean-square designs, how well each converter is known; `None` if all are exact.
     pub(crate) deviations: Option<Vec<Deviations>>,
     /// Ends the search with the best filters so far.
@@ -49,41 +49,42 @@ pub(crate) struct Settings {
     pub(crate) at_slow_rate: Option<Problem>,
 }
 
-/// Standard deviations of the errors of a converter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Standard deviations of the errors of a converter, which are Gaussian and constant while a recording
+/// lasts.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Deviations {
-    /// Of the delay.
     pub(crate) delay: FastPeriods,
-    /// Of the gain, relative to it.
+    /// As a share of the gain.
     pub(crate) gain: f64,
+    /// Of full scale, or in the scale of a signal.
+    pub(crate) offset: f64,
 }
 
 impl Deviations {
-    /// Of the channels of `spec`, for a method that averages over them; `None` if all are exact.
-    pub(crate) fn of(spec: &Spec) -> Option<Vec<Self>> {
-        let (table, channels) = (spec.uncertainty.as_ref()?, spec.channels.len());
-        let delays = table.delay_deviations(channels).into_iter();
-        let delays = delays.map(|delay| delay.in_fast_periods(spec.fast_period));
-        let pairs = delays.zip(table.gain_deviations(channels));
-        let all: Vec<Self> = pairs.map(|(delay, gain)| Self { delay, gain }).collect();
+    /// Of the converters of a spec, by its `[uncertainty]`.
+    pub(crate) fn of_spec(spec: &Spec) -> Vec<Self> {
+        let (table, count) = (spec.uncertainty.clone().unwrap_or_default(), spec.channels.len());
+        let (delays, gains) = (table.delay_deviations(count), table.gain_deviations(count));
+        let offsets = table.offset_deviations(count);
+        let of = |i: usize| {
+            let delay = delays[i].in_fast_periods(spec.fast_period);
+            Self { delay, gain: gains[i], offset: offsets[i] }
+        };
+        (0..count).map(of).collect()
+    }
+
+    /// Of the converters of `spec`, for a method that averages over them; `None` if all are exact.
+    pub(super) fn averaged_over(spec: &Spec) -> Option<Vec<Self>> {
+        let all = Self::of_spec(spec);
         let uncertain = all.iter().any(|deviations| deviations.delay.0 > 0.0 || deviations.gain > 0.0);
         (spec.design.method == Method::H2 && uncertain).then_some(all)
     }
 }
 
-/// Synthesis filters, one per channel of the plant.
-#[derive(Debug, Clone)]
-pub(crate) enum Filters {
-    /// `taps[i][n]` = `f_i[n]` at the fast rate.
-    Fir(Vec<Vec<f64>>),
-    /// F(z), M x N.
-    StateSpace(StateSpace),
-}
-
 /// The result of a method.
 #[derive(Debug, Clone)]
 pub(crate) struct Synthesis {
-    pub(crate) filters: Filters,
+    pub(crate) filters: SynthesisFilters,
     /// The norm of the error system of these filters, and the frequency of its peak in radians per slow
     /// period.
     pub(crate) peak: Peak,
@@ -113,7 +114,7 @@ impl Synthesis {
     ) -> Result<Self, DesignError> {
         let noncausal = plant.noncausal_bound()?.gain.min(peak.gain);
         Ok(Self {
-            filters: Filters::Fir(taps),
+            filters: SynthesisFilters::Fir(taps),
             lower: lower.min(peak.gain).max(noncausal),
             peak,
             noncausal,
@@ -137,8 +138,8 @@ pub(crate) fn synthesise(
     plant: &LiftedPlant,
     settings: &Settings,
 ) -> Result<Synthesis, DesignError> {
-    if let (Method::Fir, Some(problem)) = (method, &settings.robust) {
-        return robust_fir::synthesise(plant, settings, problem);
+    if let (Method::Fir, Some(errors)) = (method, &settings.robust) {
+        return robust_fir::synthesise(plant, settings, errors);
     }
     match method {
         Method::Fir => fir::synthesise(plant, settings),

@@ -25,7 +25,7 @@ use crate::arithmetic::Number;
 use crate::arithmetic::dense::{self, product, riccati_limit, select, solve, symmetric};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
-use crate::linalg::Mat;
+use crate::linalg::{self, Mat};
 use crate::lti::StateSpace;
 use nalgebra::DMatrix as Matrix;
 use std::ops::Range;
@@ -71,6 +71,7 @@ impl<F: Number> PreciseFiltering<F> {
     pub(super) fn new(plant: &LiftedPlant) -> Result<Self, DesignError> {
         let system = plant.system();
         let measured = plant.channels();
+        let stacked = |upper, lower| linalg::vstack(&[upper, lower]).map(F::from);
         let inputs = stacked(system.b(), system.d());
         Ok(Self {
             system: stacked(system.a(), system.c()),
@@ -202,14 +203,6 @@ impl<F: Number> RiccatiSolver for PreciseFiltering<F> {
             Some(true) => self.filter(&covariance).map_or(Trial::Unresolved, Trial::Achieved),
         }
     }
-}
-
-/// [upper; lower].
-fn stacked<F: Number>(upper: &Mat, lower: &Mat) -> Matrix<F> {
-    let n = upper.nrows();
-    Matrix::from_fn(n + lower.nrows(), upper.ncols(), |i, j| {
-        F::from(if i < n { upper[(i, j)] } else { lower[(i - n, j)] })
-    })
 }
 
 /// Whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below -[`SEMIDEFINITE`].

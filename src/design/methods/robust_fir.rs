@@ -6,17 +6,17 @@
 //! [`crate::design::uncertainty::search`] finds them, and its dual stays a lower bound for all banks of that
 //! length over the box.
 
-use super::{Filters, Settings, Synthesis, fir, tap_lags};
+use super::{Settings, Synthesis, fir, tap_lags};
+use crate::bank::SynthesisFilters;
 use crate::design::DesignError;
-use crate::design::error_grid::{AffineError, ErrorGrid, Location, Peaks};
+use crate::design::error_grid::{AffineError, ErrorGrid, LocatedPeak, Location};
 use crate::design::exchange::{Exchange, Tolerances};
-use crate::design::filters::{FilterResponse, impulse_responses, polyphase};
+use crate::design::filters::{FilterResponse, impulse_responses};
 use crate::design::plant::LiftedPlant;
 use crate::design::uncertainty::box_plant::{BoxPlant, Combination};
-use crate::design::uncertainty::search::{BoxSearch, WorstErrors};
+use crate::design::uncertainty::search::BoxSearch;
 use crate::linalg::{self, CMat};
 use crate::lmi::sampled::{MeanSquareObjective, Point, Problem as SampledProblem, Taps};
-use crate::lti::peak::Peak;
 use crate::spec::{ErrorBox, Method, Spec};
 use crate::units::Seconds;
 
@@ -58,37 +58,31 @@ impl RobustStudy {
 pub(crate) fn synthesise(
     plant: &LiftedPlant,
     settings: &Settings,
-    problem: &RobustProblem,
+    errors: &ErrorBox,
 ) -> Result<Synthesis, DesignError> {
     let nominal = fir::synthesise(plant, settings)?;
-    let Filters::Fir(taps) = &nominal.filters else { return Ok(nominal) };
-    let front_ends = BoxPlant::new(plant.problem(), &problem.errors)?;
+    let front_ends = BoxPlant::new(plant.problem(), errors)?;
     let search = BoxSearch::new(front_ends, tap_lags(plant.ratio(), settings.taps)[0], &[])?;
-    let study = study_of(&nominal, taps, &search)?;
+    let study = study_of(&nominal, &search)?;
     if study.nominal.largest_found <= study.lower * (1.0 + NO_GAIN) {
         return Ok(Synthesis { robust: Some(study), ..nominal });
     }
-    let found = least_worst_norm(plant, search, settings)?;
-    let lower = found.lower.max(study.lower).min(found.norms.largest_found);
-    let study = RobustStudy { lower, pairs: found.pairs, scenarios: found.scenarios, ..study };
+    let (study, found) = least_worst_norm(plant, search, settings, study)?;
     // The nominal bank is one of the candidates.
-    if found.norms.largest_found >= study.nominal.largest_found {
-        return Ok(Synthesis { robust: Some(study), ..nominal });
+    if study.robust.largest_found >= study.nominal.largest_found {
+        return Ok(Synthesis { robust: Some(RobustStudy { robust: study.nominal, ..study }), ..nominal });
     }
-    let robust = Some(RobustStudy { robust: found.norms, ..study });
     Ok(Synthesis {
         lower: nominal.lower.min(found.peak.gain),
-        noncausal: nominal.noncausal.min(found.peak.gain),
         iterations: nominal.iterations + found.iterations,
-        filters: Filters::Fir(found.taps),
-        peak: found.peak,
-        robust,
+        robust: Some(study),
+        ..found
     })
 }
 
 /// The study of a design that keeps the nominal bank.
-fn study_of(nominal: &Synthesis, taps: &[Vec<f64>], search: &BoxSearch) -> Result<RobustStudy, DesignError> {
-    let worst = worst_of(search, taps)?;
+fn study_of(nominal: &Synthesis, search: &BoxSearch) -> Result<RobustStudy, DesignError> {
+    let worst = search.worst(&nominal.filters)?;
     // Whatever the taps, each combination of errors alone has the error that no bank avoids.
     let unavoidable = search.plant().moved(&worst.point).noncausal_bound()?.gain;
     let norms = RobustNorms { nominal: nominal.peak.gain, largest_found: worst.peak.gain };
@@ -103,55 +97,43 @@ fn study_of(nominal: &Synthesis, taps: &[Vec<f64>], search: &BoxSearch) -> Resul
     })
 }
 
-/// The largest norm found of the taps over the box.
-fn worst_of(search: &BoxSearch, taps: &[Vec<f64>]) -> Result<WorstErrors, DesignError> {
-    let filters = FilterResponse::Polynomial(polyphase(taps, search.plant().ratio()));
-    search.worst(&filters, |plant| plant.fir_norm(taps))
-}
-
-/// Taps of least norm over the box.
-struct RobustTaps {
-    taps: Vec<Vec<f64>>,
-    peak: Peak,
-    norms: RobustNorms,
-    /// No taps have a smaller largest norm.
-    lower: f64,
-    scenarios: usize,
-    pairs: usize,
-    iterations: usize,
-}
-
-/// The exchange. Where the taps are worse between the errors or frequencies that the search looks at, it is
-/// repeated with these.
+/// The exchange, with what it found for the study. Where the taps are worse between the errors or
+/// frequencies that the search looks at, it is repeated with these.
 fn least_worst_norm(
     plant: &LiftedPlant,
     search: BoxSearch,
     settings: &Settings,
-) -> Result<RobustTaps, DesignError> {
+    study: RobustStudy,
+) -> Result<(RobustStudy, Synthesis), DesignError> {
     let mut exchange = exchange(plant, search, settings)?;
     let mut rounds = 0;
     let (taps, largest_found) = loop {
         let found = exchange.optimise_at(Tolerances::gradual(NORM_ACCURACY))?;
         let taps = impulse_responses(&found.taps, settings.taps);
-        let worst = worst_of(&exchange.error().search, &taps)?;
-        let enough = found.peaks.estimate.max(exchange.lower) * (1.0 + NORM_ACCURACY);
+        let worst = exchange.error.search.worst(&SynthesisFilters::Fir(taps.clone()))?;
+        let enough = found.estimate.max(exchange.lower) * (1.0 + NORM_ACCURACY);
         rounds += 1;
         if worst.peak.gain <= enough || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
             break (taps, worst.peak.gain);
         }
-        let scenario = exchange.error_mut().search.include(&worst.point);
+        let scenario = exchange.error.search.include(&worst.point);
         if !exchange.add(&[Location { frequency: worst.peak.frequency, scenario }]) {
             break (taps, worst.peak.gain);
         }
     };
     let peak = plant.fir_norm(&taps)?;
-    let norms = RobustNorms { nominal: peak.gain, largest_found };
-    let (lower, iterations) = (exchange.lower_for_all, exchange.iterations);
-    let pairs = exchange.locations().len();
-    let mut scenarios: Vec<_> = exchange.locations().iter().map(|location| &location.scenario).collect();
+    let mut scenarios: Vec<_> = exchange.locations.iter().map(|location| &location.scenario).collect();
     scenarios.sort();
     scenarios.dedup();
-    Ok(RobustTaps { peak, norms, lower, scenarios: scenarios.len(), pairs, iterations, taps })
+    let study = RobustStudy {
+        robust: RobustNorms { nominal: peak.gain, largest_found },
+        lower: exchange.lower_for_all.max(study.lower).min(largest_found),
+        scenarios: scenarios.len(),
+        pairs: exchange.locations.len(),
+        ..study
+    };
+    let found = Synthesis::of_least_gamma(plant, taps, peak, 0.0)?;
+    Ok((study, Synthesis { iterations: exchange.iterations, ..found }))
 }
 
 /// The error of fixed taps over the box.
@@ -175,9 +157,8 @@ impl AffineError for BoxError {
         Point { omega: location.frequency, h: rows(0, count), w: rows(count, g.nrows() - count) }
     }
 
-    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<Combination>, DesignError> {
-        let found = self.search.peaks(&FilterResponse::Polynomial(taps.clone()), level)?;
-        Ok(Peaks { estimate: found.estimate.max(gamma), ..found })
+    fn peaks(&self, taps: &Taps, level: f64) -> Result<Vec<LocatedPeak<Combination>>, DesignError> {
+        self.search.peaks(&FilterResponse::Polynomial(taps.clone()), level)
     }
 }
 
@@ -216,20 +197,10 @@ pub struct RobustNorms {
 /// Limit on the number of times that an exchange is repeated with errors that it did not know.
 const MISSED_ERROR_LIMIT: usize = 8;
 
-/// What a robust design is made for.
-#[derive(Debug, Clone)]
-pub(crate) struct RobustProblem {
-    /// The box.
-    pub(crate) errors: ErrorBox,
-}
-
-impl RobustProblem {
-    /// The problem of a spec whose bank is to be robust: FIR for channels with errors.
-    pub(crate) fn of(spec: &Spec) -> Option<Self> {
-        let errors = spec.error_box()?;
-        let is_robust = spec.design.method == Method::Fir && errors.sides() > 0;
-        is_robust.then_some(Self { errors })
-    }
+/// The box of a spec whose bank is to be robust: FIR for channels with errors.
+pub(crate) fn robust_box(spec: &Spec) -> Option<ErrorBox> {
+    let is_robust = |errors: &ErrorBox| spec.design.method == Method::Fir && errors.sides() > 0;
+    spec.error_box().filter(is_robust)
 }
 
 #[cfg(test)]

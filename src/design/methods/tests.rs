@@ -69,10 +69,10 @@ fn settings(case: &Case, method: Method) -> Settings {
 }
 
 /// F(z) by its definition.
-fn filter_response(filters: &Filters, ratio: usize, z: Complex<f64>) -> CMat {
+fn filter_response(filters: &SynthesisFilters, ratio: usize, z: Complex<f64>) -> CMat {
     match filters {
-        Filters::StateSpace(system) => system.response_at(z),
-        Filters::Fir(taps) => {
+        SynthesisFilters::StateSpace(_) => lifted(filters, ratio).response_at(z),
+        SynthesisFilters::Fir(taps) => {
             let term = |j: usize, lag: &crate::linalg::Mat| linalg::to_complex(lag) * z.powi(-(j as i32));
             polyphase(taps, ratio).iter().enumerate().map(|(j, lag)| term(j, lag)).sum()
         }
@@ -80,7 +80,7 @@ fn filter_response(filters: &Filters, ratio: usize, z: Complex<f64>) -> CMat {
 }
 
 /// The largest gain of W - F H on a dense grid, from the responses of the three.
-fn dense_grid(plant: &LiftedPlant, filters: &Filters) -> f64 {
+fn dense_grid(plant: &LiftedPlant, filters: &SynthesisFilters) -> f64 {
     let (h, w) = (plant.measurement(), plant.reference());
     let gain = |k: usize| {
         let z = Complex::from_polar(1.0, PI * k as f64 / 1500.0);
@@ -94,12 +94,13 @@ fn check(case: &Case, method: Method, synthesis: &Synthesis, plant: &LiftedPlant
     let what = format!("{}, {}", case.name, method.name());
     let Synthesis { filters, peak, lower, noncausal, .. } = synthesis;
     match filters {
-        Filters::Fir(taps) => {
+        SynthesisFilters::Fir(taps) => {
             assert!(method.reads("taps"), "{what}");
             assert_eq!(taps.len(), plant.channels(), "{what}");
             assert!(taps.iter().all(|filter| filter.len() == 13), "{what}");
         }
-        Filters::StateSpace(system) => {
+        SynthesisFilters::StateSpace(_) => {
+            let system = lifted(filters, plant.ratio());
             assert!(!method.has_taps(), "{what}");
             assert_eq!((system.outputs(), system.inputs()), (plant.ratio(), plant.channels()), "{what}");
             assert!(system.spectral_radius().unwrap() < 1.0, "{what}");
@@ -153,12 +154,8 @@ fn no_method_beats_those_that_minimise_gamma() {
 #[test]
 fn a_margin_is_spent_on_the_mean_square() {
     let plant = plant(&CASES[0]);
-    let h2 = |filters: &Filters| {
-        let system = match filters {
-            Filters::StateSpace(system) => system.clone(),
-            Filters::Fir(taps) => lifted(&crate::bank::SynthesisFilters::Fir(taps.clone()), 2),
-        };
-        crate::lti::gramian::h2_norm(&plant.error_system(&system)).unwrap()
+    let h2 = |filters: &SynthesisFilters| {
+        crate::lti::gramian::h2_norm(&plant.error_system(&lifted(filters, plant.ratio()))).unwrap()
     };
     for method in [Method::Fir, Method::Iir] {
         let tight = settings(&CASES[0], method);
@@ -172,11 +169,8 @@ fn a_margin_is_spent_on_the_mean_square() {
 }
 
 /// Of filters: the mean square of the error, that of the noise at the output, and the noise gain.
-fn squares(plant: &LiftedPlant, filters: &Filters) -> [f64; 3] {
-    let system = match filters {
-        Filters::StateSpace(system) => system.clone(),
-        Filters::Fir(taps) => lifted(&crate::bank::SynthesisFilters::Fir(taps.clone()), plant.ratio()),
-    };
+fn squares(plant: &LiftedPlant, filters: &SynthesisFilters) -> [f64; 3] {
+    let system = lifted(filters, plant.ratio());
     let square = |system: &crate::lti::StateSpace| crate::lti::gramian::h2_norm(system).unwrap().powi(2);
     let rms: Vec<f64> = plant.problem().noise.iter().map(|power| power.sqrt()).collect();
     let noise = square(&system.clone().scale_inputs(&rms));

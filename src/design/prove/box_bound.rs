@@ -121,7 +121,8 @@ impl Responses {
     fn new(bank: &Bank, samples: &[usize], slopes: &EnclosedSystem) -> Result<Self, DesignError> {
         let states = slopes.order();
         let middle = slopes.midpoint().ok_or(DesignError::NotCertified { states, failure: None })?;
-        let (filters, rows) = (FilterResponse::new(bank)?, FrequencyResponse::new(&state_space(&middle)));
+        let (filters, rows) =
+            (FilterResponse::new(&bank.filters, bank.ratio)?, FrequencyResponse::new(&state_space(&middle)));
         let frequencies = (0..FREQUENCIES).map(|k| PI * k as f64 / (FREQUENCIES - 1) as f64);
         let (filters, rows) =
             frequencies.map(|w| (filters.at(w).select_columns(samples), rows.at_frequency(w))).unzip();

@@ -21,32 +21,20 @@ use upper::certificate;
 /// twice the least excess of a certificate.
 const NARROW_INTERVAL: f64 = 2e-8;
 
-/// A gamma that is proven, not only computed.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Certified {
-    /// ||K|| is less than this.
-    pub gamma: f64,
-    /// ||K|| is at least this.
-    pub attained: f64,
-    /// Order of P.
-    pub states: usize,
-}
-
 /// Proves the bank's norm from both sides; see [`crate::verify`] for how.
 ///
 /// ```
 /// use hybank::{bank::Bank, design::certify};
 /// let bank = Bank::from_json(include_str!("../../../filters/thesis-fir.json"), "thesis-fir.json")?;
 /// let proven = certify(&bank)?;
-/// assert!(proven.gamma < 0.039933 && proven.gamma - proven.attained < 1e-7 * proven.gamma);
+/// assert!(proven.upper < 0.039933 && proven.upper - proven.attained < 1e-7 * proven.upper);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Errors
 /// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found.
-pub fn certify(bank: &Bank) -> Result<Certified, DesignError> {
-    let (_, Verified { upper, attained, states }) = prove(bank, &bank.gamma, &Stop::default())?;
-    Ok(Certified { gamma: upper, attained, states })
+pub fn certify(bank: &Bank) -> Result<Verified, DesignError> {
+    Ok(prove(bank, &bank.gamma, &Stop::default())?.1)
 }
 
 /// A proven lower bound of the norm of `bank`, its gain at a frequency in radians per slow period; `None`

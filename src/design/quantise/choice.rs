@@ -1,20 +1,15 @@
 //! The fewest bits of integer taps for an allowed loss of SNR, and then the taps that can be left out.
 //!
-//! Integers that fit few bits fit more bits, so the least loss of all integers falls with the bits. The
-//! search finds good integers and not always the best, so it scans neighbouring word lengths, from a first
-//! guess onwards, until one holds the loss and the next shorter one does not.
+//! Integers that fit few bits fit more bits, so the least loss of all integers falls with the bits, and so
+//! does the number of taps that can stay: both are found by bisection.
 
 use super::problem::Candidate;
 use super::quantiser::Quantiser;
-use super::{QuantisationProblem, WordChoice, WordStudy};
+use super::{NEIGHBOURS, QuantisationProblem, WordChoice, WordStudy};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::spec::WordLengths;
-
-/// Word lengths that are tried at once.
-const BATCH: usize = 5;
-/// Word lengths of the report on each side of the chosen one.
-const BESIDE: usize = 2;
+use std::ops::Range;
 
 /// What integer taps may lose and take.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,17 +31,18 @@ pub(in crate::design) fn quantise_within(
     real_gamma: f64,
     allowance: &Allowance,
 ) -> Result<(FixedPoint, WordStudy), DesignError> {
-    let Allowance { loss_db, most } = allowance;
-    let quantiser = Quantiser::within(problem, *loss_db)?;
-    let lengths = Lengths::up_to(most);
-    let (found, least) = scan(&quantiser, &lengths, allowance)?;
-    let chosen = leave_out(&quantiser, &found[least])?;
-    let beside = &found[least.saturating_sub(BESIDE)..(least + BESIDE + 1).min(found.len())];
+    let quantiser = Quantiser::within(problem, allowance.loss_db)?;
+    let fewest = fewest_bits(&quantiser, allowance)?;
+    let more_or_fewer = NEIGHBOURS.into_iter().filter_map(|more| fewest.fixed_point.bits.widened(more));
+    let beside = quantiser.quantise_all(&more_or_fewer.collect::<Vec<_>>(), None)?;
+    // The search does not always find the best integers, so fewer bits may keep to the loss too.
+    let fewest = beside.iter().find(|found| quantiser.keeps(found)).unwrap_or(&fewest);
+    let chosen = leave_out(&quantiser, fewest)?;
     let words = beside.iter().map(|found| quantiser.loss(found, None)).collect::<Result<_, _>>()?;
     let snr_loss_db = quantiser.mean_square_loss_db(&chosen);
     let fixed_point = without_zeros(chosen.fixed_point);
     let choice = WordChoice {
-        allowed_db: *loss_db,
+        allowed_db: allowance.loss_db,
         snr_loss_db,
         taps_left_out: (0..problem.taps[0].len()).filter(|&n| is_left_out(&fixed_point, n)).count(),
     };
@@ -54,56 +50,22 @@ pub(in crate::design) fn quantise_within(
     Ok((fixed_point, WordStudy { real_gamma, least_gamma, words, choice: Some(choice) }))
 }
 
-/// Word lengths that differ by a bit, the shortest first.
-struct Lengths(Vec<WordLengths>);
-
-impl Lengths {
-    fn up_to(most: &WordLengths) -> Self {
-        let mut all: Vec<WordLengths> = (0..).map_while(|fewer: i32| most.widened(-fewer)).collect();
-        all.reverse();
-        Self(all)
-    }
-
-    /// The first one whose longest word has so many bits, or the last one.
-    fn of_bits(&self, bits: u32, taps: usize) -> usize {
-        let longest = |words: &WordLengths| (0..taps).map(|n| words.bits(n)).max().unwrap_or(0);
-        self.0.iter().position(|words| longest(words) >= bits).unwrap_or(self.0.len() - 1)
-    }
-}
-
-/// Integers of consecutive word lengths, and the index of the first that keeps to the loss; the one before
-/// it, if there is one, does not.
-fn scan(
+/// Integers of the fewest bits that keep to the loss.
+fn fewest_bits(
     quantiser: &Quantiser<'_>,
-    lengths: &Lengths,
-    allowance: &Allowance,
-) -> Result<(Vec<Candidate>, usize), DesignError> {
-    let all = &lengths.0;
-    let guess = lengths.of_bits(quantiser.bits_by_rounding(), quantiser.error.problem.taps[0].len());
-    let (mut first, mut end) = (guess.saturating_sub(BATCH / 2), (guess + BATCH / 2 + 1).min(all.len()));
-    let mut found = quantiser.quantise_all(&all[first..end], None)?;
-    while quantiser.keeps(&found[0]) && first > 0 {
-        let before = first.saturating_sub(BATCH);
-        found.splice(0..0, quantiser.quantise_all(&all[before..first], None)?);
-        first = before;
+    Allowance { loss_db, most }: &Allowance,
+) -> Result<Candidate, DesignError> {
+    let longest = quantiser.quantise(most, None)?;
+    if !quantiser.keeps(&longest) {
+        let best = quantiser.mean_square_loss_db(&longest);
+        return Err(DesignError::WordsLoseMore { bits: most.clone(), best, allowed: *loss_db });
     }
-    while !found.iter().any(|found| quantiser.keeps(found)) && end < all.len() {
-        let after = (end + BATCH).min(all.len());
-        found.extend(quantiser.quantise_all(&all[end..after], None)?);
-        end = after;
-    }
-    let losses = found.iter().map(|found| quantiser.mean_square_loss_db(found));
-    let best = losses.fold(f64::INFINITY, f64::min);
-    match found.iter().position(|found| quantiser.keeps(found)) {
-        Some(least) => Ok((found, least)),
-        None => {
-            Err(DesignError::WordsLoseMore { bits: allowance.most.clone(), best, allowed: allowance.loss_db })
-        }
-    }
+    let lengths: Vec<WordLengths> = (0..).map_while(|fewer: i32| most.widened(-fewer)).collect();
+    last_that_keeps(quantiser, longest, 0..lengths.len(), |fewer| lengths[fewer].clone())
 }
 
 /// The same bits with as many taps left out as the loss allows: those whose integers matter least, and the
-/// others chosen again. Bisection between numbers of taps of which the smaller keeps to the loss.
+/// others chosen again.
 fn leave_out(quantiser: &Quantiser<'_>, found: &Candidate) -> Result<Candidate, DesignError> {
     let FixedPoint { bits, integers, .. } = &found.fixed_point;
     let powers = quantiser.error.powers();
@@ -112,19 +74,29 @@ fn leave_out(quantiser: &Quantiser<'_>, found: &Candidate) -> Result<Candidate, 
     };
     let mut order: Vec<usize> = (0..integers[0].len()).collect();
     order.sort_by(|&a, &b| size(a).total_cmp(&size(b)));
-    let without = |count: usize| {
+    let few = order.iter().filter(|&&n| size(n) == 0.0).count();
+    last_that_keeps(quantiser, found.clone(), few..order.len(), |count| {
         let bits = |n: usize| if order[..count].contains(&n) { 0 } else { bits.bits(n) };
         WordLengths::PerTap((0..order.len()).map(bits).collect())
-    };
-    let mut best = found.clone();
-    let (mut few, mut many) = (order.iter().filter(|&&n| size(n) == 0.0).count(), order.len());
-    while many - few > 1 && !quantiser.error.problem.stop.is_due() {
-        let middle = few + (many - few) / 2;
-        let tried = quantiser.quantise(&without(middle), None)?;
+    })
+}
+
+/// Integers of the last of a sequence of word lengths that keeps to the loss, by bisection. `first`, the
+/// integers of the first, keeps to it. When the design is stopped, the last that were found.
+fn last_that_keeps(
+    quantiser: &Quantiser<'_>,
+    first: Candidate,
+    mut open: Range<usize>,
+    lengths: impl Fn(usize) -> WordLengths,
+) -> Result<Candidate, DesignError> {
+    let mut best = first;
+    while open.len() > 1 && !quantiser.error.problem.stop.is_due() {
+        let middle = open.start + open.len() / 2;
+        let tried = quantiser.quantise(&lengths(middle), None)?;
         if quantiser.keeps(&tried) {
-            (few, best) = (middle, tried);
+            (open.start, best) = (middle, tried);
         } else {
-            many = middle;
+            open.end = middle;
         }
     }
     Ok(best)

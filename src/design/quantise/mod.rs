@@ -90,9 +90,8 @@ fn decades(a: f64, b: f64) -> f64 {
 ///
 /// # Errors
 /// [`DesignError::Lti`] if the plant is not stable, [`DesignError::Linalg`] if a decomposition fails,
-/// [`DesignError::AllZero`] if all taps are zero at the given scale, and [`DesignError::TinyTaps`] if they
-/// are no better there than zero taps. Without a given scale all taps may be zero, too: see
-/// [`FixedPoint::is_zero`].
+/// and [`DesignError::TinyTaps`] if the taps are no better at the given scale than zero taps. Without a
+/// given scale all taps may be zero, too: see [`FixedPoint::is_zero`].
 pub(super) fn quantise(
     problem: QuantisationProblem<'_>,
     real_gamma: f64,
@@ -116,11 +115,6 @@ pub(super) fn quantise(
         None => quantiser.quantise(bits, fraction_bits)?,
     };
     match fraction_bits {
-        Some(fraction_bits)
-            if asked.fixed_point.is_zero() && problem.taps.iter().flatten().any(|&tap| tap != 0.0) =>
-        {
-            Err(DesignError::AllZero { fraction_bits, fitting: quantiser.finest_that_fits(bits) })
-        }
         Some(fraction_bits) if quantiser.does_nothing(&asked)? => {
             Err(DesignError::TinyTaps { fraction_bits, fitting: quantiser.finest_that_fits(bits) })
         }

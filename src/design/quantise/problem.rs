@@ -79,9 +79,9 @@ impl<'a> TapError<'a> {
         let grid = ErrorGrid::new(problem.plant, lags.len())?;
         let points = grid.points();
         let forms = Forms::new(&points);
-        let real_gamma = grid.peaks(&lags, 0.0)?.estimate;
+        let real_gamma = grid.gamma(&lags)?;
         let zeros = polyphase(&vec![vec![0.0; problem.taps[0].len()]; problem.taps.len()], ratio);
-        let least_gamma = ZERO_GAMMA * grid.peaks(&zeros, 0.0)?.estimate;
+        let least_gamma = ZERO_GAMMA * grid.gamma(&zeros)?;
         let least_mean_square = ZERO_MEAN_SQUARE * grid.mean_square(&zeros);
         let real = grid.mean_square(&lags) + output_noise(problem.noise, problem.taps);
         let real_mean_square = real.max(least_mean_square);
@@ -104,7 +104,7 @@ impl<'a> TapError<'a> {
         let lags = polyphase(&taps, self.ratio);
         let found = self.grid.mean_square(&lags) + output_noise(self.problem.noise, &taps);
         let mean_square = found.max(self.least_mean_square);
-        Ok(Candidate { gamma: self.grid.peaks(&lags, 0.0)?.estimate, mean_square, fixed_point })
+        Ok(Candidate { gamma: self.grid.gamma(&lags)?, mean_square, fixed_point })
     }
 
     /// The mean square that a unit of each channel's tap adds.
@@ -145,7 +145,7 @@ impl<'a> TapError<'a> {
 
     /// Estimate of gamma of integer taps.
     pub(super) fn gamma(&self, fixed_point: &FixedPoint) -> Result<f64, DesignError> {
-        Ok(self.grid.peaks(&polyphase(&fixed_point.taps(), self.ratio), 0.0)?.estimate)
+        self.grid.gamma(&polyphase(&fixed_point.taps(), self.ratio))
     }
 }
 

@@ -6,7 +6,7 @@ use super::search::Search;
 use super::{WordLoss, decades};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
-use crate::spec::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
+use crate::spec::{MAX_FRACTION_BITS, WordLengths};
 use rayon::prelude::*;
 
 /// Relative difference of gamma below which the mean square decides: 0.001 dB.
@@ -119,18 +119,6 @@ impl<'a> Quantiser<'a> {
     /// Whether the mean square is as small as it should be.
     pub(super) fn keeps(&self, found: &Candidate) -> bool {
         found.mean_square <= self.most_mean_square
-    }
-
-    /// The bits with which rounding adds, on average, the mean square that is left: step^2 / 12 times the
-    /// power that each tap sees.
-    pub(super) fn bits_by_rounding(&self) -> u32 {
-        let taps = self.error.problem.taps;
-        let seen: f64 =
-            self.error.powers().iter().zip(taps).map(|(power, taps)| power * taps.len() as f64).sum();
-        let left = self.most_mean_square - self.error.real_mean_square;
-        let most = taps.iter().flatten().fold(0.0f64, |most, tap| most.max(tap.abs()));
-        let magnitude = (most / (12.0 * left / seen).sqrt()).log2();
-        magnitude.ceil().clamp(0.0, f64::from(MAX_BITS)) as u32 + 1
     }
 
     /// What integers lose whose scale was fixed to `fraction_bits`, or chosen.

@@ -3,12 +3,12 @@
 
 use super::truncation::Recursion;
 use crate::design::DesignError;
-use crate::design::error_grid::{AffineError, LocatedPeak, Location, Peaks};
+use crate::design::error_grid::{AffineError, LocatedPeak, Location};
 use crate::design::exchange::Exchange;
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::lmi::sampled::{self, MeanSquareObjective, Point, Taps};
-use crate::lti::peak::{Peak, peaks_above, resonances, stable_poles};
+use crate::lti::peak::{peaks_above, resonances, stable_poles};
 use crate::lti::{FrequencyResponse, StateSpace};
 use std::f64::consts::PI;
 
@@ -90,16 +90,9 @@ impl AffineError for OutputError<'_> {
         driving(&self.regressors, self.plant.at(location.frequency))
     }
 
-    fn peaks(&self, taps: &Taps, gamma: f64, level: f64) -> Result<Peaks<()>, DesignError> {
-        let bank = self.recursion.with_outputs(&taps[0]);
-        let error = self.plant.error_system(&bank);
-        let peaks = peaks_above(&error, level)?;
-        let estimate = peaks.iter().map(|peak| peak.gain).fold(gamma, f64::max);
-        let located = |peak: Peak| {
-            let location = Location { frequency: peak.frequency, scenario: () };
-            LocatedPeak { gain: peak.gain, location }
-        };
-        Ok(Peaks { estimate, peaks: peaks.into_iter().map(located).collect() })
+    fn peaks(&self, taps: &Taps, level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
+        let error = self.plant.error_system(&self.recursion.with_outputs(&taps[0]));
+        Ok(peaks_above(&error, level)?.into_iter().map(LocatedPeak::from).collect())
     }
 }
 

@@ -2,7 +2,8 @@ use super::plant_samples::PlantSamples;
 use super::truncation::{self, Recursion, mean_square_bank};
 use super::*;
 use crate::design::Problem;
-use crate::design::methods::{Filters, Settings, synthesise};
+use crate::design::filters::lifted;
+use crate::design::methods::{Settings, synthesise};
 use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, Complex, Mat};
 use crate::lti::gramian::{balanced, h2_norm};
@@ -29,10 +30,7 @@ fn thesis(latency: usize) -> LiftedPlant {
 
 /// The full bank.
 fn bank_of(method: Method, plant: &LiftedPlant) -> StateSpace {
-    match synthesise(method, plant, &Settings::default()).unwrap().filters {
-        Filters::StateSpace(system) => system,
-        Filters::Fir(_) => unreachable!(),
-    }
+    lifted(&synthesise(method, plant, &Settings::default()).unwrap().filters, plant.ratio())
 }
 
 fn problem<'a>(plant: &'a LiftedPlant, bank: &'a StateSpace, aim: Aim) -> ReductionProblem<'a> {

@@ -245,7 +245,7 @@ fn signals_in_a_band_get_the_latency_that_their_samples_need() {
             let best = best_taps(&problem, 48 / ratio, instants).unwrap();
             let tap = |i: usize, n: usize| best[n % ratio][i][n / ratio];
             let taps = (0..delays.len()).map(|i| (0..48).map(|n| tap(i, n)).collect()).collect();
-            whole_error(&plant, &Filters::Fir(taps)).unwrap()
+            whole_error(&plant, &SynthesisFilters::Fir(taps)).unwrap()
         };
         let errors: Vec<f64> = (0..32).map(error).collect();
         assert_eq!((shortest(&errors), latency(&spec)), (expected, Ok(expected)), "{band}: {errors:?}");

@@ -203,7 +203,7 @@ impl BoxPlant {
     ///
     /// # Errors
     /// [`DesignError::Lti`] if a front end is not stable.
-    pub(in crate::design) fn resonances(&self) -> Result<&[f64], DesignError> {
+    pub(in crate::design) fn resonances(&self) -> Result<Vec<f64>, DesignError> {
         self.plant.resonances()
     }
 

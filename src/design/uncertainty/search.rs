@@ -9,10 +9,10 @@
 //! So what is found is attained. That nothing larger was missed is not proven; `verify` has an upper bound.
 
 use super::box_plant::{BoxPlant, BoxResponse, Combination};
+use crate::bank::SynthesisFilters;
 use crate::design::DesignError;
-use crate::design::error_grid::{Frequencies, LocatedPeak, Location, PRUNE_LEVEL, Peaks};
+use crate::design::error_grid::{Frequencies, LocatedPeak, Location, PRUNE_LEVEL};
 use crate::design::filters::FilterResponse;
-use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, CMat, Complex};
 use crate::lti::peak::{Peak, local_maxima, refine};
 use crate::spec::ErrorPoint;
@@ -65,7 +65,7 @@ impl BoxSearch {
         lags: usize,
         resonances: &[f64],
     ) -> Result<Self, DesignError> {
-        let frequencies = Frequencies::new(lags, &[plant.resonances()?, resonances].concat());
+        let frequencies = Frequencies::new(lags, &[&plant.resonances()?, resonances].concat());
         let responses = frequencies.all.iter().map(|_| OnceCell::new()).collect();
         Ok(Self { corners: plant.corners(), plant, frequencies, responses })
     }
@@ -82,21 +82,19 @@ impl BoxSearch {
         combination
     }
 
-    /// The errors of the largest `norm` found over the box; no errors are among those that are tried.
+    /// The errors of the largest norm of a bank found over the box; no errors are among those that are
+    /// tried.
     ///
     /// # Errors
-    /// As [`BoxSearch::peaks`], and those of `norm`.
-    pub(in crate::design) fn worst(
-        &self,
-        filters: &FilterResponse,
-        norm: impl Fn(&LiftedPlant) -> Result<Peak, DesignError>,
-    ) -> Result<WorstErrors, DesignError> {
+    /// As [`BoxSearch::peaks`], and [`DesignError::Lti`] for unstable filters.
+    pub(in crate::design) fn worst(&self, filters: &SynthesisFilters) -> Result<WorstErrors, DesignError> {
         let at = |point: ErrorPoint| {
-            let peak = norm(&self.plant.moved(&point))?;
+            let peak = self.plant.moved(&point).bank_norm(filters)?;
             Ok::<_, DesignError>(WorstErrors { point, peak })
         };
         let without_errors = at(ErrorPoint::none(self.plant.options().len()))?;
-        self.worst_points(filters)?.into_iter().try_fold(without_errors, |worst, point| {
+        let response = FilterResponse::new(filters, self.plant.ratio())?;
+        self.worst_points(&response)?.into_iter().try_fold(without_errors, |worst, point| {
             let other = at(point)?;
             Ok(if other.peak.gain > worst.peak.gain { other } else { worst })
         })
@@ -110,7 +108,7 @@ impl BoxSearch {
         &self,
         filters: &FilterResponse,
         level: f64,
-    ) -> Result<Peaks<Combination>, DesignError> {
+    ) -> Result<Vec<LocatedPeak<Combination>>, DesignError> {
         let found = self.sweep(filters, PRUNE_LEVEL * level)?;
         self.peaks_among(&found, filters, level)
     }
@@ -121,7 +119,7 @@ impl BoxSearch {
         found: &[Vec<Found>],
         filters: &FilterResponse,
         level: f64,
-    ) -> Result<Peaks<Combination>, DesignError> {
+    ) -> Result<Vec<LocatedPeak<Combination>>, DesignError> {
         let grid: Vec<Peak> = found
             .iter()
             .zip(&self.frequencies.all)
@@ -138,8 +136,7 @@ impl BoxSearch {
                 }
             }
         }
-        let estimate = peaks.iter().map(|peak| peak.gain).fold(0.0, f64::max);
-        Ok(Peaks { estimate, peaks })
+        Ok(peaks)
     }
 
     /// The combinations found at each frequency, the worst first. Where the gains are below `level` some
@@ -255,7 +252,7 @@ impl BoxSearch {
     fn worst_points(&self, filters: &FilterResponse) -> Result<Vec<ErrorPoint>, DesignError> {
         let found = self.sweep(filters, 0.0)?;
         let most = found.iter().map(|found| highest(found)).fold(0.0, f64::max);
-        let mut peaks = self.peaks_among(&found, filters, NEAR_WORST * most)?.peaks;
+        let mut peaks = self.peaks_among(&found, filters, NEAR_WORST * most)?;
         peaks.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let mut points: Vec<ErrorPoint> = Vec::new();
         for peak in peaks {

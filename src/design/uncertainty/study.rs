@@ -47,8 +47,8 @@ impl BoxStudy {
 
 /// The errors of the box with the largest norm found.
 fn worst_errors(bank: &Bank, errors: &ErrorBox) -> Result<WorstErrors, DesignError> {
-    let filters = FilterResponse::new(bank)?;
+    let filters = FilterResponse::new(&bank.filters, bank.ratio)?;
     let plant = BoxPlant::new(&Problem::of_bank(bank)?, errors)?;
     let search = BoxSearch::new(plant, filters.lags(), filters.resonances())?;
-    search.worst(&filters, |plant| plant.bank_norm(&bank.filters))
+    search.worst(&bank.filters)
 }

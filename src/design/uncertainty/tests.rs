@@ -38,7 +38,7 @@ fn gain(bank: &Bank, omega: f64, point: &ErrorPoint) -> f64 {
     let front_ends: Vec<_> = spec.channels.iter().map(|channel| made(&channel.filter)).collect();
     let times = spec.layout().waited_delays(&spec.delays());
     let owners = spec.layout().owners();
-    let f = FilterResponse::new(bank).unwrap().at(omega);
+    let f = FilterResponse::new(&bank.filters, bank.ratio).unwrap().at(omega);
     let k = CMat::from_fn(m, (2 * ALIASES + 1) as usize, |p, column| {
         let nu = (omega + TAU * f64::from(column as i32 - ALIASES)) / m as f64;
         let of = |filter: &StrictlyProper| {

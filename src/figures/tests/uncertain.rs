@@ -90,9 +90,9 @@ fn uncertain_values_count_as_converters_that_are_off() {
         let found = Decibels::of_power(wanted / error);
         println!("{errors:?}: SNR {:.2} dB simulated, {:.2} dB predicted", found.0, told.0);
         assert!((found - told).0.abs() < 0.5, "{errors:?}: {found:?} {told:?}");
-        let spread = Spread::of_spec(case.bank.spec.as_ref().unwrap());
-        let response = FilterResponse::new(&case.bank).unwrap();
-        let there = ToneResponse::new(case.plain, response, spread).at(bin as f64 / (2 * FRAMES) as f64);
+        let spread = Deviations::of_spec(case.bank.spec.as_ref().unwrap());
+        let tones = ToneResponse::new(&case.bank, case.plain, spread).unwrap();
+        let there = tones.at(bin as f64 / (2 * FRAMES) as f64);
         for (power, told) in [(image, there.image), (gains, there.gain_error)] {
             let found = power.sqrt();
             println!("{errors:?}: {found:.3e} simulated, {told:.3e} predicted");

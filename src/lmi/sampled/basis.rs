@@ -21,16 +21,8 @@ pub(super) struct Basis {
 
 impl Basis {
     /// `weights[l]` multiplies the row entries at point l.
-    pub(super) fn new(reduced: &Reduced, weights: Vec<f64>) -> Result<Self, LinalgError> {
-        Self::with_noise(reduced, weights, &[])
-    }
-
-    /// With the taps of original channel i, times `noise[i]`, as further rows whose reference is zero.
-    pub(super) fn with_noise(
-        reduced: &Reduced,
-        weights: Vec<f64>,
-        noise: &[f64],
-    ) -> Result<Self, LinalgError> {
+    /// The taps of original channel i, times `noise[i]`, are further rows whose reference is zero.
+    pub(super) fn new(reduced: &Reduced, weights: Vec<f64>, noise: &[f64]) -> Result<Self, LinalgError> {
         let map = row_map(reduced, &weights, noise);
         let zero_rows = map.nrows() - 2 * reduced.h.cols() * reduced.count();
         let (l, q) = linalg::lq(&map.transpose());

@@ -12,7 +12,7 @@
 
 use super::basis::Basis;
 use super::prepare::Reduced;
-use super::problem::{Problem, Taps};
+use super::problem::{Point, Problem, Taps};
 use crate::linalg::blocks::Blocks;
 use crate::linalg::{self, CMat, Complex, LinalgError, Mat};
 
@@ -28,94 +28,57 @@ const ROUNDING_PER_OPERATION: f64 = 16.0;
 /// A lower bound, computed in doubles and not proven.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LowerBound {
-    /// `gamma(F) >= value` for all taps covered; never negative.
+    /// `gamma(F) >= value` for the taps covered; never negative.
     pub value: f64,
-    /// Norm of the residual r, each channel scaled by its strength.
-    pub residual: f64,
-    /// The taps covered.
-    pub covered: Covered,
+    /// Whether all taps are covered: larger taps than those within the radius have a larger worst case in
+    /// any case. Otherwise the bound holds for taps up to a thousand times the size of those found.
+    pub covers_all: bool,
 }
 
-/// The taps for which a lower bound holds. The size of taps is `sqrt(sum_{p,i,j} (s_i F_j[p,i])^2)` with
-/// `s_i` the largest row norm of channel i over the points.
+/// The taps for which a lower bound is computed: those of at most a size. The size of taps is
+/// `sqrt(sum_{p,i,j} (s_i F_j[p,i])^2)` with `s_i` the largest row norm of channel i over the points.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Covered {
-    /// All taps: larger taps have a larger worst case in any case.
-    All,
-    /// Taps of at most this size.
-    Within(f64),
-}
-
-impl LowerBound {
-    /// The trivial bound.
-    pub(super) fn zero() -> Self {
-        Self { value: 0.0, residual: 0.0, covered: Covered::All }
-    }
+pub(super) struct Coverage {
+    radius: f64,
+    is_all: bool,
 }
 
 /// A lower bound on the optimum of `problem` from any dual matrices, one for each point (each M x q), for
-/// all taps within `radius` (see [`Covered`]). Uses nothing but the data and the inequality in the module's
+/// all taps within `radius` (see [`Coverage`]). Uses nothing but the data and the inequality in the module's
 /// text, less an estimate of the rounding errors of the sums.
-pub(crate) fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<LowerBound, LinalgError> {
-    let points = problem.points();
+pub(crate) fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<f64, LinalgError> {
     let mut nuclear = 0.0;
     for y in dual {
         nuclear += linalg::singular_values(y)?.iter().sum::<f64>();
     }
-    let value = pairwise(0..points.len(), &|l| re_inner(&dual[l], &points[l].w));
-    let moduli: f64 = dual.iter().zip(points).map(|(y, p)| y.norm() * p.w.norm()).sum();
-    let depth =
-        ROUNDING_PER_OPERATION + (problem.rows() * problem.inputs()) as f64 + (points.len() as f64).log2();
-    let residual = residual_norm(problem, dual);
-    let charged = value - residual * radius - depth * f64::EPSILON * moduli;
-    let bound = charged / (nuclear * (1.0 + (ROUNDING_PER_OPERATION + points.len() as f64) * f64::EPSILON));
-    let value = if bound.is_finite() { bound.max(0.0) } else { 0.0 };
-    Ok(LowerBound { value, residual, covered: Covered::Within(radius) })
-}
-
-/// Pairwise summation: its rounding error grows only with the logarithm of the number of terms.
-fn pairwise<T: std::ops::Add<Output = T>>(range: std::ops::Range<usize>, term: &impl Fn(usize) -> T) -> T {
-    let middle = range.start + range.len() / 2;
-    if middle == range.start {
-        return term(range.start);
-    }
-    pairwise(range.start..middle, term) + pairwise(middle..range.end, term)
-}
-
-fn re_inner(a: &CMat, b: &CMat) -> f64 {
-    a.iter().zip(b.iter()).map(|(x, y)| x.re * y.re + x.im * y.im).sum()
+    let pairs = || dual.iter().zip(problem.points());
+    let value: f64 = pairs().map(|(y, point)| y.dotc(&point.w).re).sum();
+    let moduli: f64 = pairs().map(|(y, point)| y.norm() * point.w.norm()).sum();
+    let depth = ROUNDING_PER_OPERATION + (problem.rows() * problem.inputs() + dual.len()) as f64;
+    let charged = value - residual_norm(problem, dual) * radius - depth * f64::EPSILON * moduli;
+    let bound = charged / nuclear;
+    Ok(if bound.is_finite() { bound.max(0.0) } else { 0.0 })
 }
 
 /// Norm of `r_{p,i,j} / s_i` plus an estimate of its rounding error.
 fn residual_norm(problem: &Problem, dual: &[CMat]) -> f64 {
-    let (m, lags) = (problem.rows(), problem.max_lags());
-    if lags == 0 {
-        return 0.0;
-    }
-    let scaled: Vec<CMat> = strengths(problem)
-        .iter()
-        .enumerate()
-        .filter(|(_, s)| **s > 0.0)
-        .fold(vec![Vec::new(); problem.points().len()], |mut rows, (i, s)| {
-            for (row, p) in rows.iter_mut().zip(problem.points()) {
-                row.push(p.h.row(i) / Complex::new(*s, 0.0));
-            }
-            rows
-        })
-        .iter()
-        .map(|rows| if rows.is_empty() { CMat::zeros(0, problem.inputs()) } else { CMat::from_rows(rows) })
-        .collect();
+    let unit: Vec<f64> =
+        strengths(problem).into_iter().map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }).collect();
+    let scaled = |point: &Point| point.h.map_with_location(|i, _, h| h * unit[i]);
+    let scaled: Vec<CMat> = problem.points().iter().map(scaled).collect();
     let products: Vec<CMat> = dual.iter().zip(&scaled).map(|(y, h)| y * h.adjoint()).collect();
-    let mut square = 0.0;
+    let (lags, mut square) = (problem.max_lags(), 0.0);
     for j in 0..lags {
-        let term = |l: usize| &products[l] * Complex::from_polar(1.0, problem.points()[l].omega * j as f64);
-        let r = pairwise(0..products.len(), &term);
-        let rows = (0..m).filter(|&p| j < problem.lags()[p]);
+        let mut r = CMat::zeros(problem.rows(), problem.channels());
+        for (product, point) in products.iter().zip(problem.points()) {
+            r += product * Complex::from_polar(1.0, point.omega * j as f64);
+        }
+        let rows = (0..problem.rows()).filter(|&p| j < problem.lags()[p]);
         square += rows.map(|p| r.row(p).iter().map(|z| z.re * z.re).sum::<f64>()).sum::<f64>();
     }
     let moduli: f64 = dual.iter().zip(&scaled).map(|(y, h)| y.norm() * h.norm()).sum();
     let angle = problem.points().iter().map(|p| p.omega.abs()).fold(0.0, f64::max) * lags as f64;
-    let depth = ROUNDING_PER_OPERATION + problem.inputs() as f64 + (products.len() as f64).log2() + angle;
+    let depth = ROUNDING_PER_OPERATION + (problem.inputs() + products.len()) as f64 + angle;
     square.sqrt() + depth * f64::EPSILON * moduli * (lags as f64).sqrt()
 }
 
@@ -124,7 +87,7 @@ fn strengths(problem: &Problem) -> Vec<f64> {
     (0..problem.channels()).map(|i| norms(i).fold(0.0, f64::max)).collect()
 }
 
-/// Size of the taps, see [`Covered`].
+/// Size of the taps, see [`Coverage`].
 fn size(problem: &Problem, taps: &Taps) -> f64 {
     let strength = strengths(problem);
     let square =
@@ -141,13 +104,13 @@ pub(super) fn cover(
     reduced: &Reduced,
     basis: &Basis,
     (taps, gamma): (&Taps, f64),
-) -> Result<(f64, Covered), LinalgError> {
+) -> Result<Coverage, LinalgError> {
     let reference = problem.points().iter().map(|p| p.w.norm()).fold(0.0, f64::max);
     let stated = RADIUS_FACTOR * size(problem, taps).max(reference);
     let spread = (problem.rows() as f64).sqrt() * gamma;
     let image = problem.points().iter().map(|p| (p.w.norm() + spread).powi(2)).sum::<f64>().sqrt();
     let confined = image * basis.inverse_norm() * mix_norm(problem, reduced)?;
-    Ok(if confined < stated { (confined, Covered::All) } else { (stated, Covered::Within(stated)) })
+    Ok(Coverage { radius: confined.min(stated), is_all: confined < stated })
 }
 
 /// Largest growth from reduced taps to the size of taps; infinite if channels had to be dropped.
@@ -159,7 +122,8 @@ fn mix_norm(problem: &Problem, reduced: &Reduced) -> Result<f64, LinalgError> {
     let scaled = Mat::from_fn(reduced.mix.nrows(), strength.len(), |r, i| reduced.mix[(r, i)] * strength[i]);
     Ok(linalg::singular_values(&scaled)?.first().copied().unwrap_or(0.0))
 }
-/// The best bound that the dual iterate `z` (blocks of order M + k1) gives, with its matrices `Y_l`.
+
+/// The best bound that the dual iterate `z` (blocks of order M + k1) gives.
 ///
 /// At an optimum `Z11` sits on the worst singular vectors, and `Y = [-Z12, Z11 W_rest]` in compressed
 /// inputs is `Z11 K / gamma`, a subgradient. Its first part is made orthogonal to all taps.
@@ -168,22 +132,14 @@ pub(super) fn from_iterate(
     reduced: &Reduced,
     basis: &Basis,
     z: &Blocks,
-    (radius, covered): (f64, Covered),
-) -> Result<(LowerBound, Vec<CMat>), LinalgError> {
-    let mut best = (LowerBound::zero(), zero_dual(problem));
+    coverage: Coverage,
+) -> Result<LowerBound, LinalgError> {
+    let mut value = 0.0;
     for cut in CUTS {
-        let dual = dual_matrices(reduced, basis, z, cut);
-        let bound = lower_bound(problem, &dual, radius)?;
-        if bound.value > best.0.value {
-            best = (LowerBound { covered, ..bound }, dual);
-        }
+        value =
+            f64::max(value, lower_bound(problem, &dual_matrices(reduced, basis, z, cut), coverage.radius)?);
     }
-    Ok(best)
-}
-
-/// Dual matrices that give no bound.
-pub(super) fn zero_dual(problem: &Problem) -> Vec<CMat> {
-    vec![CMat::zeros(problem.rows(), problem.inputs()); problem.points().len()]
+    Ok(LowerBound { value, covers_all: coverage.is_all })
 }
 
 fn dual_matrices(reduced: &Reduced, basis: &Basis, z: &Blocks, cut: f64) -> Vec<CMat> {

@@ -10,15 +10,13 @@ use super::prepare::Reduced;
 use super::problem::{MeanSquareObjective, Point, Problem, Taps};
 use super::quadratic::Quadratic;
 use crate::linalg::LinalgError;
+use crate::lmi::IsDue;
 use crate::lmi::factor::RegularisedCholesky;
 use crate::lmi::iteration::{self, Iterate, RANK_TOLERANCE};
-use crate::lmi::{IsDue, Outcome};
 
 /// Taps of least mean square under a cap.
 #[derive(Debug, Clone)]
 pub struct MeanSquare {
-    /// Why the iteration ended.
-    pub outcome: Outcome,
     /// `F_j`, M x N for each lag.
     pub taps: Taps,
     /// The secondary objective of these taps.
@@ -47,7 +45,7 @@ pub(crate) fn least_squares(
         return Ok(problem.zero_taps());
     }
     let roots = |powers: &[f64]| powers.iter().map(|power| power.sqrt()).collect::<Vec<f64>>();
-    let basis = Basis::with_noise(&reduced, roots(&square.weights), &roots(&square.noise))?;
+    let basis = Basis::new(&reduced, roots(&square.weights), &roots(&square.noise))?;
     Ok(reduced.taps(&basis.least_squares(&reduced, &reduced.w, tol_rank)))
 }
 
@@ -71,7 +69,7 @@ pub fn mean_square_under_cap(
     let mut best = Best::new(problem, square, cap, start)?;
     best.offer(free)?;
     if best.mean_square == free_square {
-        return Ok(Some(best.finish(Outcome::Solved, free_square, 0)));
+        return Ok(Some(best.finish(free_square, 0)));
     }
     if best.gamma >= cap {
         return Ok(None);
@@ -85,15 +83,15 @@ pub fn mean_square_under_cap(
     let curvature = RegularisedCholesky::new(quadratic.curvature(&reduced));
     let engine = Engine::new(&reduced, Objective::MeanSquare(quadratic), zero, 1.0, is_due);
     let (Some(engine), Ok(curvature)) = (engine, curvature) else {
-        return Ok(Some(best.finish(Outcome::NumericalTrouble, free_square, 0)));
+        return Ok(Some(best.finish(free_square, 0)));
     };
     let mut run = Run { engine, curvature };
-    let (outcome, iterations) = iteration::run(&mut run, tol_gap_rel, is_due)?;
+    let (_, iterations) = iteration::run(&mut run, tol_gap_rel, is_due)?;
     let step = reduced.taps(&run.engine.x);
     let found = start.iter().zip(step).map(|(f, d)| f + d * cap).collect();
     best.offer(best.within_cap(found)?)?;
     let lower = (best.mean_square - run.duality_gap() * (unit * cap * cap)).max(free_square);
-    Ok(Some(best.finish(outcome, lower, iterations)))
+    Ok(Some(best.finish(lower, iterations)))
 }
 
 /// The problem with the error of `start` as its reference.
@@ -121,7 +119,7 @@ impl<'a> Best<'a> {
         cap: f64,
         start: &Taps,
     ) -> Result<Self, LinalgError> {
-        let (gamma, _) = problem.worst(start)?;
+        let gamma = problem.worst(start)?;
         let mean_square = problem.mean_square(start, square);
         Ok(Self { problem, square, cap, taps: start.clone(), mean_square, gamma })
     }
@@ -129,7 +127,7 @@ impl<'a> Best<'a> {
     /// Takes the taps if they respect the cap and improve.
     fn offer(&mut self, taps: Taps) -> Result<(), LinalgError> {
         let mean_square = self.problem.mean_square(&taps, self.square);
-        let (gamma, _) = self.problem.worst(&taps)?;
+        let gamma = self.problem.worst(&taps)?;
         if gamma <= self.cap && (mean_square < self.mean_square || self.gamma > self.cap) {
             (self.taps, self.mean_square, self.gamma) = (taps, mean_square, gamma);
         }
@@ -139,7 +137,7 @@ impl<'a> Best<'a> {
     /// The taps, or, if rounding has put them beyond the cap, ones on the way to them from the best so far.
     /// Gamma and the objective are convex, so what lies between is under the cap and an improvement.
     fn within_cap(&self, taps: Taps) -> Result<Taps, LinalgError> {
-        let (gamma, _) = self.problem.worst(&taps)?;
+        let gamma = self.problem.worst(&taps)?;
         if gamma <= self.cap || self.gamma >= self.cap {
             return Ok(taps);
         }
@@ -147,9 +145,9 @@ impl<'a> Best<'a> {
         Ok(self.taps.iter().zip(taps).map(|(own, taps)| own + (taps - own) * share).collect())
     }
 
-    fn finish(self, outcome: Outcome, lower: f64, iterations: usize) -> MeanSquare {
+    fn finish(self, lower: f64, iterations: usize) -> MeanSquare {
         let Self { taps, mean_square, gamma, .. } = self;
-        MeanSquare { outcome, taps, mean_square, lower: lower.min(mean_square), gamma, iterations }
+        MeanSquare { taps, mean_square, lower: lower.min(mean_square), gamma, iterations }
     }
 }
 

@@ -64,9 +64,9 @@ mod quadratic;
 mod tests;
 mod worst_case;
 
+pub use bound::LowerBound;
 #[cfg(test)]
 pub(crate) use bound::lower_bound;
-pub use bound::{Covered, LowerBound};
 #[cfg(test)]
 pub(crate) use mean_square::least_squares;
 pub use mean_square::{MeanSquare, mean_square_under_cap};

@@ -113,16 +113,10 @@ impl Problem {
         point.error(&response(taps, point.omega, self.rows(), self.channels()))
     }
 
-    /// Largest `sigma_max(K_l)` over the points, and the index of the point where it is attained.
-    pub(crate) fn worst(&self, taps: &Taps) -> Result<(f64, usize), LinalgError> {
-        let mut worst = (0.0, 0);
-        for l in 0..self.points.len() {
-            let sigma = linalg::largest_singular_value(&self.error_at(l, taps))?;
-            if sigma > worst.0 {
-                worst = (sigma, l);
-            }
-        }
-        Ok(worst)
+    /// Largest `sigma_max(K_l)` over the points.
+    pub(crate) fn worst(&self, taps: &Taps) -> Result<f64, LinalgError> {
+        let gain = |l: usize| linalg::largest_singular_value(&self.error_at(l, taps));
+        (0..self.points.len()).map(gain).try_fold(0.0, |worst, gain| Ok(f64::max(worst, gain?)))
     }
 
     /// Value of the secondary objective: see [`MeanSquareObjective`].

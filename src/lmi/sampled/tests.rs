@@ -7,8 +7,8 @@ mod mean_square;
 
 use super::*;
 use crate::linalg::{CMat, Complex};
+use crate::lmi::FINEST_GAP;
 use crate::lmi::testbank::{self, TestBank};
-use crate::lmi::{FINEST_GAP, Outcome};
 use crate::random::Random;
 
 fn bank_problem(bank: &TestBank, omegas: &[f64], taps: usize) -> Problem {
@@ -21,33 +21,21 @@ fn relative_gap(s: &Solution) -> f64 {
     if s.gamma > 0.0 { (s.gamma - s.lower.value).max(0.0) / s.gamma } else { 0.0 }
 }
 
-fn is_solved(outcome: Outcome) -> bool {
-    matches!(outcome, Outcome::Solved | Outcome::SolvedInaccurate)
-}
-
 /// What every result promises, whatever the problem.
 fn check(problem: &Problem, s: &Solution) {
-    assert_eq!(problem.worst(&s.taps).unwrap().0, s.gamma);
-    let Covered::Within(radius) = s.lower.covered else {
-        // The stored matrices prove a bound with an empty residual budget too.
-        let again = lower_bound(problem, &s.dual, 0.0).unwrap();
-        assert!(again.value >= s.lower.value && again.residual < 1e-10 * (1.0 + again.residual));
-        return;
-    };
-    let again = lower_bound(problem, &s.dual, radius).unwrap();
-    assert_eq!(again, s.lower);
+    assert_eq!(problem.worst(&s.taps).unwrap(), s.gamma);
+    assert!(s.lower.value <= s.gamma);
 }
 
 fn report(name: &str, problem: &Problem, s: &Solution, seconds: f64) {
     println!(
-        "{name}: {:?} gamma {:.10} lower {:.10} gap {:.1e} steps {} residual {:.1e} {:?} {} unknowns {} points {:.3} s",
-        s.outcome,
+        "{name}: solved {} gamma {:.10} lower {:.10} gap {:.1e} steps {} {:?} {} unknowns {} points {:.3} s",
+        s.is_solved,
         s.gamma,
         s.lower.value,
         relative_gap(s),
         s.iterations,
-        s.lower.residual,
-        s.lower.covered,
+        s.lower,
         problem.lags().iter().sum::<usize>() * problem.channels(),
         problem.points().len(),
         seconds

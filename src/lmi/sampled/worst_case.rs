@@ -1,13 +1,13 @@
 //! Taps of least worst-case norm over the points.
 
 use super::basis::Basis;
-use super::bound::{self, Covered, LowerBound};
+use super::bound::{self, LowerBound};
 use super::interior::{Engine, Objective, norm};
 use super::prepare::Reduced;
 use super::problem::{Problem, Taps};
-use crate::linalg::{self, CMat, LinalgError};
+use crate::linalg::LinalgError;
+use crate::lmi::IsDue;
 use crate::lmi::iteration::{self, GAP_OF_ZERO, Iterate, RANK_TOLERANCE};
-use crate::lmi::{IsDue, Outcome};
 
 /// The start lies this factor above the worst point of the least-squares taps (in t), far enough inside for
 /// the first Newton step.
@@ -16,16 +16,14 @@ const START_MARGIN: f64 = 2.0;
 /// Taps of least worst-case norm with the interval that the optimum lies in.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    /// Why the iteration ended.
-    pub outcome: Outcome,
+    /// Whether the gap to the lower bound is within the tolerance.
+    pub is_solved: bool,
     /// `F_j`, M x N for each lag.
     pub taps: Taps,
     /// Largest `sigma_max(K_l)` of these taps over the points.
     pub gamma: f64,
     /// Lower bound on gamma for all taps of the same lags, rounding errors subtracted.
     pub lower: LowerBound,
-    /// The matrices `Y_l` (M x q) that give it through `lower_bound`.
-    pub dual: Vec<CMat>,
     /// Number of steps.
     pub iterations: usize,
 }
@@ -34,7 +32,7 @@ pub struct Solution {
 /// the method.
 ///
 /// Every well-formed problem has a solution: the result holds the best taps found, their worst case over the
-/// points and a lower bound, whatever the outcome. When the end `is_due`, they are the best so far.
+/// points and a lower bound, solved or not. When the end `is_due`, they are the best so far.
 ///
 /// # Errors
 /// [`LinalgError`] if the data are not finite or a decomposition does not converge.
@@ -43,11 +41,11 @@ pub fn minimise(problem: &Problem, tol_gap_rel: f64, is_due: IsDue<'_>) -> Resul
     if reduced.layout.unknowns() == 0 {
         return fixed(problem);
     }
-    let basis = Basis::new(&reduced, vec![1.0; reduced.count()])?;
+    let basis = Basis::new(&reduced, vec![1.0; reduced.count()], &[])?;
     let x = basis.least_squares(&reduced, &reduced.w, RANK_TOLERANCE);
     let best = Best::new(problem, reduced.taps(&x))?;
     if best.relative_gap() <= tol_gap_rel {
-        return Ok(best.finish(Outcome::Solved, 0));
+        return Ok(best.finish(true, 0));
     }
     // Shift and scale to the least-squares solution: the rest is of order one.
     let scale = best.gamma;
@@ -55,25 +53,22 @@ pub fn minimise(problem: &Problem, tol_gap_rel: f64, is_due: IsDue<'_>) -> Resul
     reduced.rescale(scale);
     let zero = vec![0.0; x.len()];
     let Some(engine) = Engine::new(&reduced, Objective::WorstCase, zero, START_MARGIN, is_due) else {
-        return Ok(best.finish(Outcome::NumericalTrouble, 0));
+        return Ok(best.finish(false, 0));
     };
     let mut run = Run { problem, reduced: &reduced, basis: &basis, start: x, scale, engine, best };
-    let (outcome, iterations) = iteration::run(&mut run, tol_gap_rel, is_due)?;
+    let (is_solved, iterations) = iteration::run(&mut run, tol_gap_rel, is_due)?;
     if is_due() {
         run.offer_taps()?;
     }
-    Ok(run.best.finish(outcome, iterations))
+    Ok(run.best.finish(is_solved, iterations))
 }
 
-/// A problem without taps: its singular vectors attain the lower bound.
+/// A problem without taps: its worst case is the optimum.
 fn fixed(problem: &Problem) -> Result<Solution, LinalgError> {
     let taps = problem.zero_taps();
-    let (gamma, worst_point) = problem.worst(&taps)?;
-    let mut dual = bound::zero_dual(problem);
-    let svd = linalg::svd(&problem.points()[worst_point].w)?;
-    dual[worst_point] = svd.u.column(0) * svd.v.column(0).adjoint();
-    let lower = LowerBound { covered: Covered::All, ..bound::lower_bound(problem, &dual, 0.0)? };
-    Ok(Solution { outcome: Outcome::Solved, taps, gamma, lower, dual, iterations: 0 })
+    let gamma = problem.worst(&taps)?;
+    let lower = LowerBound { value: gamma, covers_all: true };
+    Ok(Solution { is_solved: true, taps, gamma, lower, iterations: 0 })
 }
 
 struct Best {
@@ -82,15 +77,13 @@ struct Best {
     taps: Taps,
     gamma: f64,
     lower: LowerBound,
-    dual: Vec<CMat>,
 }
 
 impl Best {
     fn new(problem: &Problem, taps: Taps) -> Result<Self, LinalgError> {
-        let (gamma, _) = problem.worst(&taps)?;
-        let floor = GAP_OF_ZERO * problem.worst(&problem.zero_taps())?.0;
-        let (lower, dual) = (LowerBound::zero(), bound::zero_dual(problem));
-        Ok(Self { floor, taps, gamma, lower, dual })
+        let gamma = problem.worst(&taps)?;
+        let floor = GAP_OF_ZERO * problem.worst(&problem.zero_taps())?;
+        Ok(Self { floor, taps, gamma, lower: LowerBound { value: 0.0, covers_all: true } })
     }
 
     fn relative_gap(&self) -> f64 {
@@ -98,9 +91,9 @@ impl Best {
         if gap <= self.floor { 0.0 } else { gap / self.gamma }
     }
 
-    fn finish(self, outcome: Outcome, iterations: usize) -> Solution {
-        let Self { taps, gamma, lower, dual, .. } = self;
-        Solution { outcome, taps, gamma, lower, dual, iterations }
+    fn finish(self, is_solved: bool, iterations: usize) -> Solution {
+        let Self { taps, gamma, lower, .. } = self;
+        Solution { is_solved, taps, gamma, lower, iterations }
     }
 }
 
@@ -120,7 +113,7 @@ impl Run<'_> {
     fn offer_taps(&mut self) -> Result<(), LinalgError> {
         let x: Vec<f64> = self.start.iter().zip(&self.engine.x).map(|(a, b)| a + self.scale * b).collect();
         let taps = self.reduced.taps(&x);
-        let (gamma, _) = self.problem.worst(&taps)?;
+        let gamma = self.problem.worst(&taps)?;
         if gamma < self.best.gamma {
             (self.best.taps, self.best.gamma) = (taps, gamma);
         }
@@ -140,11 +133,11 @@ impl Iterate for Run<'_> {
     fn judged_gap(&mut self) -> Result<f64, LinalgError> {
         self.offer_taps()?;
         let best = &mut self.best;
-        let cover = bound::cover(self.problem, self.reduced, self.basis, (&best.taps, best.gamma))?;
-        let (lower, dual) =
-            bound::from_iterate(self.problem, self.reduced, self.basis, &self.engine.cone.z, cover)?;
+        let coverage = bound::cover(self.problem, self.reduced, self.basis, (&best.taps, best.gamma))?;
+        let z = &self.engine.cone.z;
+        let lower = bound::from_iterate(self.problem, self.reduced, self.basis, z, coverage)?;
         if lower.value > best.lower.value {
-            (best.lower, best.dual) = (lower, dual);
+            best.lower = lower;
         }
         Ok(best.relative_gap())
     }

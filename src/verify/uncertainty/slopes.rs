@@ -14,7 +14,6 @@
 //!   -x s C (s - A)^-2 B.
 
 use super::super::ball::{self, Ball, Matrix};
-use super::super::covariance::steady_state;
 use super::super::front_ends::{Equations, FrontEnds};
 use super::super::state_transition::{StateTransition, state_transition};
 use super::super::timeline::SamplingInstant;
@@ -30,6 +29,12 @@ const LEAST_HALF_WIDTH: FastPeriods = FastPeriods(1e-9);
 const SMALL_POWER: f64 = 1e-9;
 /// Doublings of the number of slow periods until then.
 const DOUBLINGS: usize = 20;
+/// Remainder of the sum over the past, relative to the rounding error of an operation.
+const NEGLIGIBLE_REMAINDER: f64 = 1e-9;
+/// 2^64 slow periods bring any stable filter to its steady state.
+const STEADY_DOUBLINGS: usize = 64;
+/// Makes up for the roundings of the remainder's bound, sums of as many terms as there are states.
+const REMAINDER_OUTWARD: f64 = 1.01;
 /// Radii and the rest of a sum over it up to which it is resolved.
 const RESOLVED: f64 = 1e-2;
 /// Makes up for the roundings of a sum of bounds in double precision.
@@ -105,6 +110,22 @@ fn square_of_row<F: Number>(front_ends: &FrontEnds, sample: &SamplingInstant, ra
     let row = front_ends.output(sample);
     let state = steady_state(&transition, &gramian)?;
     absolute_sum(&row, &transition, &ball::product_transposed(&state, &row))
+}
+
+/// X = E X E' + G by doubling; the remainder after 2^k steps is at most ||E^(2^k)||^2 of the whole.
+/// `None` if E is not seen to be stable.
+fn steady_state<F: Number>(transition: &Matrix<F>, gramian: &Matrix<F>) -> Option<Matrix<F>> {
+    let (mut state, mut power) = (gramian.clone(), transition.clone());
+    for _ in 0..STEADY_DOUBLINGS {
+        let size = ball::row_sum(&power) * ball::row_sum(&power.transpose());
+        if size < F::ROUNDING * NEGLIGIBLE_REMAINDER {
+            let rest = REMAINDER_OUTWARD * ball::row_sum(&state) * size;
+            return Some(state.map(|x| x.widened(rest)));
+        }
+        state += ball::congruence(&power, &state);
+        power = ball::product(&power, &power);
+    }
+    None
 }
 
 /// A bound on |c x| + 2 sum over n > 0 of |c E^n x|; `None` if that is not resolved.

@@ -27,7 +27,7 @@ fn reader(
     let input = Input::on_thread_of("dying".into(), header, 1, send_all).unwrap();
     let (stop, until) = (crossbeam_channel::never(), Until::Shortest);
     let inputs = vec![input];
-    MultiReader { inputs, stop, until, stalls: None, max_lost: 0, origin: 0, ready: 0, consumed: 0 }
+    MultiReader { inputs, stop, until, max_lost: 0, origin: 0, ready: 0, consumed: 0 }
 }
 
 #[test]
@@ -36,23 +36,23 @@ fn a_reader_that_dies_is_an_error_and_not_the_end_of_its_input() {
         messages.send(Ok(Message::Frames { bytes: vec![1, 2, 3], filled: 3 })).unwrap();
         // As when it panics: the channel closes without an end.
     });
-    assert_eq!(reader.wait().unwrap(), Arrival::Frames(3));
+    assert_eq!(reader.wait(&mut |_| {}).unwrap(), Arrival::Frames(3));
     reader.consume(3);
-    let error = reader.wait().unwrap_err();
+    let error = reader.wait(&mut |_| {}).unwrap_err();
     assert!(matches!(&error, IoError::ReaderDied { file } if file == "dying"), "{error}");
 }
 
 #[test]
 fn a_panic_in_a_reader_is_an_error_too() {
     let mut reader = reader(|_messages, _| panic!("a reader that panics, for this test"));
-    assert!(matches!(reader.wait(), Err(IoError::ReaderDied { .. })));
+    assert!(matches!(reader.wait(&mut |_| {}), Err(IoError::ReaderDied { .. })));
 }
 
 #[test]
 fn an_input_that_ends_is_no_error() {
     let mut reader =
         reader(|messages, _| messages.send(Ok(Message::End { faults: vec![], chunks: vec![] })).unwrap());
-    assert_eq!(reader.wait().unwrap(), Arrival::End);
+    assert_eq!(reader.wait(&mut |_| {}).unwrap(), Arrival::End);
 }
 
 #[test]
@@ -63,10 +63,10 @@ fn time_interleaved_converters_are_the_channels_of_one_input() {
     std::fs::write(&path, (0u8..14).collect::<Vec<_>>()).unwrap();
     let interleaving = TimeInterleaving::by_delay(&[0.0, 2.0, 1.0]);
     let options = ReadOptions { interleaving: Some(&interleaving), ..raw(1) };
-    let mut reader = MultiReader::start(&[path], options).unwrap();
+    let mut reader = MultiReader::start(&[path], options, &mut |_| {}).unwrap();
     assert_eq!(reader.channels(), 3);
     let mut bytes: Vec<u8> = Vec::new();
-    while let Arrival::Frames(frames) = reader.wait().unwrap() {
+    while let Arrival::Frames(frames) = reader.wait(&mut |_| {}).unwrap() {
         bytes.extend(reader.frames()[0].bytes);
         reader.consume(frames);
     }
@@ -86,7 +86,7 @@ fn more_lost_samples_than_allowed_are_refused_with_the_bound() {
     let lost = LostSamples::parse(lines, "lost").unwrap();
     let start = |max_lost| {
         let options = ReadOptions { lost: Some(&lost), max_lost, ..raw(1) };
-        MultiReader::start(std::slice::from_ref(&path), options)
+        MultiReader::start(std::slice::from_ref(&path), options, &mut |_| {})
     };
     assert!(start(80).is_ok());
     let error = start(79).err().unwrap().to_string();

