@@ -1,8 +1,8 @@
 //! What first order leaves of a filter whose cut-off is off.
 //!
 //! Phi(s (1 + x)) is Phi with its cut-off divided by 1 + x. On the imaginary axis a pole p changes the
-//! filter by the factor 1 / (1 + x a) with a = s / (s - p), |a| <= |p| / |Re p|, and a zero z makes of s
-//! - z the sum (s - z) + x s. With m >= |z|, |s - z| <= |s| + m <= 2^(1/2) |s + m|, without the root for
+//! filter by the factor 1 / (1 + x a) with a = s / (s - p), |a| <= |p| / |Re p|, and a zero z makes of
+//! (s - z) the sum (s - z) + x s. With m >= |z|, |s - z| <= |s| + m <= 2^(1/2) |s + m|, without the root for
 //! a real z, and |s| <= |s + m|. So relative to the same filter with the zeros at -m, each coefficient of
 //! the power series in x is at most that of
 //!

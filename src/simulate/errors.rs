@@ -111,7 +111,7 @@ pub struct RefusedError {
 pub enum ErrorRule {
     /// A number out of its range.
     #[error(transparent)]
-    Number(#[from] SpecProblem),
+    Number(Box<SpecProblem>),
     /// A list of another length.
     #[error(transparent)]
     Count(#[from] ChannelCount),
@@ -146,6 +146,12 @@ pub enum ErrorRule {
     /// `fit` of the spec names a stage that a filter does not have.
     #[error("`fit` of the spec names {0}, and a filter has no such stage")]
     NoStage(Fitting),
+}
+
+impl From<SpecProblem> for ErrorRule {
+    fn from(problem: SpecProblem) -> Self {
+        Self::Number(Box::new(problem))
+    }
 }
 
 /// Names the field of a refusal.

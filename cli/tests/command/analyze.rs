@@ -42,7 +42,7 @@ fn figures_with_errors_are_computed_there() {
         bank["channels"][channel]["delay"] = delay.into();
     }
     bank.as_object_mut().unwrap().retain(|key, _| key != "digest" && key != "proof" && key != "gamma");
-    desk.write("moved.json", &bank.to_string());
+    desk.write("moved.json", bank.to_string());
     let moved = desk.json(&["analyze", "moved.json", "--json"]);
     let (at, there) = (&found["with_errors"], &moved["figures"]);
     assert!((number(&at["snr_db"]) - number(&there["snr"]["total_db"])).abs() < 1e-6, "{at} {there}");

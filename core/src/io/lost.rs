@@ -307,7 +307,10 @@ mod tests {
             (r#"{"channel": 0, "first": 1, "length": 3}"#, "count from 1"),
             (r#"{"first": 1, "length": 99999999999999}"#, "at most"),
             (r#"{"first": 18446744073709551615, "length": 1}"#, "at most"),
-            (r#"{"first": -1, "length": 1}"#, "expected a whole number, zero or more, found -1"),
+            (
+                r#"{"first": -1, "length": 1}"#,
+                "expected a whole number, zero or more, without point and exponent, found -1",
+            ),
             (r#"{"first": 1, "lenght": 1}"#, "unknown key \"lenght\""),
             ("1,2,3", "expected a JSON object"),
             (r#"{"first": 1, "length": 3} {}"#, "more text after the end"),

@@ -109,7 +109,7 @@ impl Spec {
     pub fn with_errors(&self, point: &ErrorPoint) -> Self {
         let mut moved = self.clone();
         for (i, channel) in moved.channels.iter_mut().enumerate() {
-            channel.delay = channel.delay + point.delays[i].in_seconds(self.fast_period);
+            channel.delay += point.delays[i].in_seconds(self.fast_period);
             channel.gain *= 1.0 + point.gains[i];
             if point.cutoffs[i] != 0.0 {
                 channel.filter = channel.filter.with_cutoff_scaled(1.0 + point.cutoffs[i]);

@@ -77,7 +77,7 @@ pub struct RefusedBox {
 pub enum BoxRule {
     /// A number out of its range.
     #[error(transparent)]
-    Number(#[from] SpecProblem),
+    Number(Box<SpecProblem>),
     /// A list of another length.
     #[error(transparent)]
     Count(#[from] ChannelCount),
@@ -95,6 +95,12 @@ pub enum BoxRule {
         /// Channels of the bank.
         channels: usize,
     },
+}
+
+impl From<SpecProblem> for BoxRule {
+    fn from(problem: SpecProblem) -> Self {
+        Self::Number(Box::new(problem))
+    }
 }
 
 /// Names the field of a refusal.

@@ -172,7 +172,7 @@ fn every_mistake_has_its_line_and_its_message() {
     refused("", 1, "missing");
     // serde reads a list as the values of a table, key by key.
     refused(&thesis_with("[design]", "[[design]]"), 16, "expected a table of keys and values, found a list");
-    let target = thesis_with("[target]\nfilter", "target.filter = ['butterworth', 4, 9e3]\n[design]\nfilter");
+    let target = thesis_with("[target]\nfilter", "target.filter = ['butterworth', 4, 9e3]\n[signal]\nfilter");
     assert!(
         message(&target).contains("target.filter: expected a table of keys and values"),
         "{}",
