@@ -175,12 +175,12 @@ fn numbers_beyond_every_range_are_said_to_be_that() {
 
 /// Only the parser's words, without the line.
 #[test]
-fn nesting_is_refused_with_its_line() {
+fn nesting_is_refused() {
     let desk = desk();
     let dotted = vec!["a"; 200].join(".");
     for deep in [format!("{dotted} = 1"), format!("a = {}{}", "[".repeat(200), "]".repeat(200))] {
         desk.write("spec.toml", format!("ratio = 2\n{deep}\n"));
-        desk.refused(1, &["design", "spec.toml", "-o", "out.json"], &["spec.toml:2:", "nested too deeply"]);
+        desk.refused(1, &["design", "spec.toml", "-o", "out.json"], &["spec.toml: lists and tables are nested too deeply"]);
     }
     desk.write("deep.json", format!("{{\"format\": \"hybank-bank\",\n\"spec\": {}", "[".repeat(500)));
     desk.refused(1, &["analyze", "deep.json"], &["deep.json: line 2, column", "nested too deeply"]);
@@ -289,7 +289,7 @@ fn errors_of_json_are_in_plain_words() {
     for (line, words) in [
         (r#"{"first": "one", "length": 3}"#, "expected a whole number, zero or more, without point"),
         (r#"{"frist": 1, "length": 3}"#, "unknown key \"frist\"; the keys here are channel, sample_start"),
-        ("[1]", "expected a JSON object such as"),
+        ("[1]", "but a JSON object such as"),
     ] {
         desk.write("lost", line);
         desk.refused(1, &fuse(&["--gaps", "zero", "--lost", "lost"]), &["lost: line 1:", words]);

@@ -254,23 +254,7 @@ impl Spec {
         let design =
             design.and_then(|()| self.design.check_beside(self.uncertainty.as_ref(), self.channels.len()));
         design.map_err(|error| error.inside("design"))?;
-        self.check_cutoffs()?;
         self.check_sizes(&layout)
-    }
-
-    /// The proof of a robust design does not cover uncertain cut-offs behind the filter of a signal.
-    fn check_cutoffs(&self) -> Result<(), SpecError> {
-        let uncertain =
-            |table: &UncertaintySpec| table.cutoffs(self.channels.len()).iter().any(|half| *half > 0.0);
-        if self.design.method == Method::Fir
-            && self.signal.is_some()
-            && self.uncertainty.as_ref().is_some_and(uncertain)
-        {
-            let (first, second) = ("[signal]", "cutoff");
-            let remedy = "the method fir is proven for uncertain cut-offs without a signal only; leave one of the two out";
-            return Err(Refusal::new("uncertainty.cutoff", SpecProblem::Conflict { first, second, remedy }));
-        }
-        Ok(())
     }
 
     /// Whether the filters are FIR: by the method, by its taps, or because `h2` averages over uncertain

@@ -22,9 +22,12 @@ use crate::units::{FastPeriods, GridTime, Seconds};
 
 /// C of the module's page. `the_pade_form_leaves_at_most_its_remainder` proves it.
 pub(super) const PADE_REMAINDER: f64 = 1.26;
-/// Smallest delta of a Pade form: smaller errors take that of this one, which holds for them too. Its
-/// remainder is below 1e-17, and 106 bits resolve it.
+/// Smallest error whose remainder is bounded: smaller ones take the bound of this one, which holds for them
+/// too. It is below 1e-17, and 106 bits resolve it.
 const LEAST_HALF_WIDTH: FastPeriods = FastPeriods(1e-9);
+/// Smallest delta of a Pade form in H': the pole 2 / delta of a smaller one is so far from those of smooth
+/// filters that double precision finds no certificate.
+const LEAST_PADE_WIDTH: FastPeriods = FastPeriods(1e-3);
 /// Powers of the transition are small from this row sum on, so that the sum over all of them is known.
 const SMALL_POWER: f64 = 1e-9;
 /// Doublings of the number of slow periods until then.
@@ -40,8 +43,13 @@ const RESOLVED: f64 = 1e-2;
 /// Makes up for the roundings of a sum of bounds in double precision.
 const SUM_OUTWARD: f64 = 1.001;
 
-/// The delta of the Pade form for an error of the delay.
+/// The delta of the Pade form in H' for an error of the delay.
 pub(super) fn pade_width(half: FastPeriods) -> FastPeriods {
+    FastPeriods(half.0.max(LEAST_PADE_WIDTH.0))
+}
+
+/// The half-width for which a remainder is bounded.
+pub(super) fn bounded_width(half: FastPeriods) -> FastPeriods {
     FastPeriods(half.0.max(LEAST_HALF_WIDTH.0))
 }
 
@@ -52,10 +60,10 @@ pub(super) fn delay_slope(filter: &Equations, delta: FastPeriods) -> Equations {
     slope.then(&smoother(delta, [Ball::from(1.0), Ball::ZERO]))
 }
 
-/// s^2 / (1 + s delta / 2)^2 times a strictly proper filter.
-pub(super) fn delay_curvature(filter: &Equations, delta: FastPeriods) -> Equations {
+/// s^2 / ((1 + s width / 2) (1 + s delta / 2)) times a strictly proper filter.
+pub(super) fn delay_curvature(filter: &Equations, width: FastPeriods, delta: FastPeriods) -> Equations {
     let rate = rate(delta);
-    delay_slope(filter, delta).then(&smoother(delta, [-rate, rate]))
+    delay_slope(filter, width).then(&smoother(delta, [-rate, rate]))
 }
 
 /// c / (1 + s delta / 2) + d.
@@ -237,7 +245,7 @@ mod tests {
                     (equations.clone(), alias_norm(&written, 2, at)),
                     (delay_slope(&equations, delta), alias_norm(&written, 2, |f, nu| at(f, nu) * slope(nu))),
                     (
-                        delay_curvature(&equations, delta),
+                        delay_curvature(&equations, delta, delta),
                         alias_norm(&written, 2, |f, nu| at(f, nu) * slope(nu) * slope(nu)),
                     ),
                     (cutoff_slope(&equations), alias_norm(&written, 2, derivative)),

@@ -129,12 +129,6 @@ fn every_mistake_has_its_line_and_its_message() {
         ("[design]", "[uncertainty]\ngain = [0.1]\n[design]", 17, "one for each of the 2"),
         ("[design]", "[uncertainty]\ncutoff = 0.5\n[design]", 17, "0.01 is one per cent"),
         ("[design]", "[uncertainty]\ngain = [0, 0.5]\n[design]", 17, "at most 0.49"),
-        (
-            "[design]",
-            "[signal]\nband = 0.1\n[uncertainty]\ncutoff = 0.01\n[design]",
-            19,
-            "leave one of the two out",
-        ),
         ("[design]", "[uncertainty]\nreference = 3\n[design]", 17, "one of the channels 1 to 2"),
         ("[design]", "[uncertainty]\ndely = 0.1\n[design]", 17, "did you mean \"delay\""),
         // Design.
