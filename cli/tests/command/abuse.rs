@@ -18,7 +18,7 @@ fn a_latency_beyond_memory_is_refused() {
         desk.refused(
             1,
             &["design", "spec.toml", "-o", "bank.json", "--method", method],
-            &["spec.toml", "latency 65536", "states"],
+            &["spec.toml:3:", "latency: ", "at most 4096 states"],
         );
     }
 }

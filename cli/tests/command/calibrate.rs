@@ -378,7 +378,7 @@ fn what_cannot_be_calibrated_is_refused_with_the_reason() {
     refused(&names, &["--reference", "5"], 1, &["the channels are 1 to 4"]);
     refused(&names, &["--tone", "61.3 parsec"], 2, &["--tone"]);
     refused(&names, &["--tone", "auto", "--blind"], 2, &["cannot be used with"]);
-    refused(&names[..3], &[], 1, &["the spec has 4 channels, but the captures have 3"]);
+    refused(&names[..3], &[], 1, &["the spec has 4 channels, but the input has 3"]);
     let noise: Vec<f32> = (0..5000).map(|_| dice.sample() as f32).collect();
     wav::write(&desk, "noise.wav", 1, 1_000_000_000, &noise);
     refused(&names, &["--training", "noise.wav"], 1, &["waveform"]);

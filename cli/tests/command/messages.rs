@@ -180,7 +180,11 @@ fn nesting_is_refused() {
     let dotted = vec!["a"; 200].join(".");
     for deep in [format!("{dotted} = 1"), format!("a = {}{}", "[".repeat(200), "]".repeat(200))] {
         desk.write("spec.toml", format!("ratio = 2\n{deep}\n"));
-        desk.refused(1, &["design", "spec.toml", "-o", "out.json"], &["spec.toml: lists and tables are nested too deeply"]);
+        desk.refused(
+            1,
+            &["design", "spec.toml", "-o", "out.json"],
+            &["spec.toml: lists and tables are nested too deeply"],
+        );
     }
     desk.write("deep.json", format!("{{\"format\": \"hybank-bank\",\n\"spec\": {}", "[".repeat(500)));
     desk.refused(1, &["analyze", "deep.json"], &["deep.json: line 2, column", "nested too deeply"]);

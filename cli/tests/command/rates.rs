@@ -321,8 +321,9 @@ fn worst_cases_take_one_error_per_converter() {
     let spec = SPEC.replace("method = \"h2\"\ntaps = 72\nnoise = 3e-4", "method = \"fir\"\ntaps = 18");
     let desk = Desk::with_spec(&spec);
     desk.report(&["design", "spec.toml", "-o", "bank.json"]);
-    let plain = desk.report(&["analyze", "bank.json"]);
-    let moved = desk.report(&["analyze", "bank.json", "--delay-error", "0,4e-7"]);
-    assert!(moved["gamma"].as_f64().unwrap() > plain["gamma"].as_f64().unwrap(), "{plain} {moved}");
+    let plain = desk.json(&["analyze", "bank.json", "--json"]);
+    let moved = desk.json(&["analyze", "bank.json", "--delay-error", "0,4e-7", "--json"]);
+    let (at, without) = (&moved["with_errors"]["snr_db"], &plain["figures"]["snr"]["total_db"]);
+    assert!(at.as_f64().unwrap() < without.as_f64().unwrap(), "{plain} {moved}");
     desk.refused(1, &["analyze", "bank.json", "--delay-error", "0,0,0,1e-9,1e-9"], &["2"]);
 }

@@ -32,7 +32,6 @@ fn a_page_shows_the_bank_and_loads_nothing() {
         "largest image of a tone",
         "plain interleaving",
         "proven for this page",
-        "this bank has at most",
         "multiply-adds",
         "hybank verify b.json",
     ] {
@@ -52,7 +51,7 @@ fn the_figures_are_those_of_verify() {
         digits.trim_end_matches('0').to_owned()
     };
     let page = page(&desk, &[]);
-    assert!(page.contains(&format!("{} to {}", bound("lower"), bound("upper"))), "{proven}");
+    assert!(page.contains(&format!("{} to {}", bound("attained"), bound("upper"))), "{proven}");
 }
 
 #[test]

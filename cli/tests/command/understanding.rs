@@ -197,7 +197,7 @@ fn a_bank_is_drawn_in_nine_pictures() {
             ("group-delay", &["fast samples"]),
             ("impulse-responses", &["channel 2"]),
             ("error", &["upper bound", "lower bound", "modulo the slow rate"]),
-            ("delay-error", &["gamma", "error of each delay"]),
+            ("delay-error", &["gamma", "error of the delay"]),
         ] {
             let picture = String::from_utf8(desk.read(&format!("pictures/{name}.svg"))).unwrap();
             assert!(picture.starts_with("<svg") && !picture.contains("NaN"), "{name}");
@@ -285,7 +285,7 @@ fn the_error_of_a_model_is_carried_into_the_uncertainty() {
         ("{ response = \"none.csv\", order = 3 }", &["none.csv", "target.filter"][..]),
         ("{ response = \"bode.csv\" }", &["target.filter", "the key order is missing"]),
         ("{ touchstone = \"bode.csv\", order = 3 }", &["bode.csv", ".s1p or .s2p"]),
-        ("{ response = \"bode.csv\", order = 3, num = [1.0] }", &["unknown key \"num\""]),
+        ("{ response = \"bode.csv\", order = 3, num = [1.0] }", &["both response and num are given"]),
         ("{ response = \"late.csv\", order = 4 }", &["late.csv", "deembed", "without a delay of 400"]),
     ] {
         desk.write("late.csv", bode(9000.0, 400e-6));
