@@ -14,6 +14,7 @@ pub use hybank_linalg as linalg;
 /// The crate `hybank-sampling`: splines, and samples that are not uniform.
 pub use hybank_sampling as sampling;
 
+pub mod align;
 pub mod analog;
 pub(crate) mod arithmetic;
 pub mod calibrate;
@@ -30,7 +31,7 @@ pub mod overview;
 pub mod plot;
 pub mod simulate;
 pub mod sine_fit;
-pub mod track;
+
 pub mod verify;
 
 #[cfg(test)]

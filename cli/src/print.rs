@@ -2,6 +2,7 @@
 //! of a failure, with the options of this program that remedy an error of the library. The library itself
 //! names keys of the spec and fields, because its errors are also read in Python, in C and in a browser.
 
+use hybank::align::AlignError;
 use hybank::calibrate::{CalibrateError, Warning};
 use hybank::design::DesignError;
 use hybank::files::FileError;
@@ -11,7 +12,6 @@ use hybank::messages::printable;
 use hybank::overview::understood;
 use hybank::pipeline::PipelineError;
 use hybank::spec::Spec;
-use hybank::track::AlignError;
 use hybank::verify::VerifyError;
 pub(super) use hybank_program::{Failure, is_dash, print, print_bytes, say};
 use hybank_program::{Program, put};

@@ -15,8 +15,8 @@
 //! exact samples at the distance T the variance is q a^2 b^2 / (3 T), a and b the distances from them.
 
 use super::SamplingError;
-use super::fit::{Fit, PosteriorCovariance, Response};
-use super::nonuniform::{Measured, Smoothness};
+use super::fit::{Fit, PosteriorCovariance};
+use super::nonuniform::Measured;
 
 /// Knots per length over which samples act.
 const KNOTS_PER_LENGTH: f64 = 6.0;
@@ -26,8 +26,6 @@ const MOST_KNOTS: f64 = 2e5;
 const LONGEST: f64 = 30.0;
 /// Deviation of the best sample, over that of a walk between two knots.
 const LEAST_ERROR: f64 = 1e-4;
-/// Knots to each side of a position over which samples have an influence, beside those of the longest gap.
-const INFLUENCE_KNOTS: usize = 24;
 
 /// A smoothing spline with its samples.
 #[derive(Debug, Clone)]
@@ -40,8 +38,6 @@ pub struct SmoothingSpline {
     line: Line,
     /// Distance of knots.
     step: f64,
-    /// Knots that a response needs.
-    reach: usize,
     walk: f64,
 }
 
@@ -110,14 +106,7 @@ impl SmoothingSpline {
         }
         fit.add_roughness_penalty(1.0);
         fit.solve()?;
-        let gap = samples.windows(2).map(|pair| pair[1].x - pair[0].x).fold(0.0, f64::max);
-        let reach = INFLUENCE_KNOTS + 2 * (gap / step).ceil() as usize;
-        Ok(Self { fit, samples, weights, line, step, reach, walk })
-    }
-
-    /// The samples by increasing position.
-    pub fn samples(&self) -> &[Measured] {
-        &self.samples
+        Ok(Self { fit, samples, weights, line, step, walk })
     }
 
     /// What is known at x. Beyond the samples the function goes on as a line, and the variance grows.
@@ -136,35 +125,6 @@ impl SmoothingSpline {
             slope_variance: unit * slope_variance / (self.step * self.step),
         };
         found.moved(x - inside, self.walk)
-    }
-
-    /// Bound of |J(x) - f(x)|, for x between the samples, if no sample errs by more than `factor` times its
-    /// deviations, |f'(x)| is at most the slope and |f''| nowhere larger than the curvature of `f`. With
-    /// the influences h_s of the samples, whose sum is one, d_s = x_s - x and the largest jitters B_s,
-    ///
-    /// ```text
-    /// |f'| |sum h_s d_s| + (1/2) |f''| sum |h_s| d_s^2
-    ///     + sum |h_s| (E_s + (|f'| + |f''| |d_s|) B_s + (1/2) |f''| B_s^2)
-    /// ```
-    ///
-    /// The first term is zero up to rounding. It holds for the samples at hand, however they lie.
-    pub fn error_bound(&self, x: f64, f: Smoothness, factor: f64) -> f64 {
-        let first = self.samples[0].x;
-        let mut response = Response::default();
-        self.fit.respond_within((x - first) / self.step, self.reach, &mut response);
-        let far = self.reach as f64 * self.step;
-        let near = |position: f64| self.samples.partition_point(|s| s.x < position);
-        let (mut shift, mut spread, mut errors) = (0.0, 0.0, 0.0);
-        for k in near(x - far)..near(x + far) {
-            let s = &self.samples[k];
-            let h = self.weights[k] * response.at::<4>((s.x - first) / self.step);
-            let (d, jitter) = (s.x - x, factor * s.jitter);
-            let displaced = (f.slope + f.curvature * (d.abs() + 0.5 * jitter)) * jitter;
-            shift += h * d;
-            spread += h.abs() * d * d;
-            errors += h.abs() * (factor * s.error + displaced);
-        }
-        f.slope * shift.abs() + 0.5 * f.curvature * spread + errors
     }
 
     /// Difference between each sample and what the others say, over its standard deviation.

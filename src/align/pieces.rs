@@ -4,7 +4,6 @@
 //! cross-correlation gives its lag to a part of a sample, and a blind calibration the rest. Each is measured
 //! on its own, so no piece is lost where some are zero.
 
-use super::super::source::LARGEST_DEVIATION;
 use super::{AlignError, Stretches};
 use crate::calibrate::{
     CalibrateError, CalibrationSignal, ChannelEstimate, Correlation, LagLine, Record, Settings, calibrate,
@@ -13,6 +12,9 @@ use crate::calibrate::{
 use crate::linalg::fourier;
 use crate::spec::Spec;
 
+/// A measurement with a larger standard deviation says nothing, in fast periods: its interval is as wide as
+/// the distance of two channels.
+const LARGEST_DEVIATION: f64 = 0.25;
 /// Pieces on each side whose lags say where that of a piece is to be.
 const BESIDE: usize = 7;
 /// Samples by which the lag of a piece may differ from what the pieces beside it say.

@@ -1,9 +1,8 @@
 //! The delays over the time that all recordings have in common, and the spec for them.
 
-use super::super::timeline::Timeline;
-use super::super::{DelayState, Reading};
 use super::pieces::PieceEstimate;
-use super::{AlignSettings, AlignWarning, AlignedChannel, Stretches};
+use super::timeline::Timeline;
+use super::{AlignSettings, AlignWarning, AlignedChannel, DelayState, Reading, Stretches};
 use crate::calibrate::{Calibration, ChannelEstimate, Warning, applied};
 use crate::sine_fit::Estimate;
 use crate::spec::{HALF_WIDTH, Spec};

@@ -1,10 +1,9 @@
 //! Delays at any instant from readings that are known beforehand.
 
-use super::filter::DelayState;
-use super::readings::Reading;
-use crate::sampling::nonuniform::{Measured, Smoothness};
+use super::reading::Reading;
+use super::state::DelayState;
+use crate::sampling::nonuniform::Measured;
 use crate::sampling::{SamplingError, SmoothingSpline};
-use crate::spec::HALF_WIDTH;
 use crate::units::Seconds;
 
 /// Readings beyond this many standard deviations of what the others say are refused.
@@ -17,7 +16,7 @@ const BESIDE: usize = 4;
 const TIME_ROUNDING: f64 = 0.288_675_134_594_812_9;
 
 /// The delay of one channel over time, from all readings of it: those after an instant count as much as
-/// those before it. The rate walks as in a [`super::DelayFilter`], so this is its smoother.
+/// those before it. The rate walks at random.
 #[derive(Debug, Clone)]
 pub(super) struct Timeline {
     spline: SmoothingSpline,
@@ -26,8 +25,7 @@ pub(super) struct Timeline {
 }
 
 impl Timeline {
-    /// Of channel `i`, with the time of a frame. `None` with readings of fewer than two frames: then the
-    /// filter follows them.
+    /// Of channel `i`, with the time of a frame. `None` with readings of fewer than two frames.
     ///
     /// # Errors
     /// [`SamplingError`] if no spline goes through the readings.
@@ -78,18 +76,6 @@ impl Timeline {
     pub(super) fn refuses(&self, frame: u64) -> bool {
         self.refused.contains(&frame)
     }
-
-    /// By how much the delay errs at most if each reading that was taken is within its 95 % interval and no
-    /// rate changes by more than `change` in a second; `None` before the first reading and after the last.
-    pub(super) fn bound(&self, time: Seconds, change: f64) -> Option<Seconds> {
-        let samples = self.spline.samples();
-        let (first, last) = (samples[0].x, samples[samples.len() - 1].x);
-        let state = self.at(time);
-        let slope = state.rate.abs() + HALF_WIDTH * state.rate_variance.sqrt();
-        let limits = Smoothness { slope, curvature: change };
-        let is_inside = (first..=last).contains(&time.0);
-        is_inside.then(|| Seconds(self.spline.error_bound(time.0, limits, HALF_WIDTH)))
-    }
 }
 
 fn spline(samples: &[(u64, Measured)], rate_walk: f64) -> Result<SmoothingSpline, SamplingError> {
@@ -110,7 +96,6 @@ fn contradictory(spline: &SmoothingSpline) -> Vec<usize> {
 mod tests {
     use super::*;
     use crate::random::Random;
-    use crate::track::{DelayFilter, DelayMeasurement};
 
     const FRAME: Seconds = Seconds(1e-3);
 
@@ -128,34 +113,21 @@ mod tests {
 
     const RATE_WALK: f64 = 1e-12;
 
-    /// A rate that changes by 2 ppm in each second: the root mean square error of the smoother is half that
-    /// of the filter, and less than the delays two readings ahead that a filter gives to the taps.
+    /// A rate that changes by 2 ppm in each second: the delays err as the spline states.
     #[test]
-    fn readings_on_both_sides_halve_the_error_of_the_filter() {
-        let (sigma, delay) = (2e-8, |t: f64| 1e-5 + 3e-6 * t + 5e-7 * (2.0 * t).sin());
-        let all = readings(400, 20, sigma, delay);
+    fn the_stated_error_is_that_of_the_delays() {
+        let delay = |t: f64| 1e-5 + 3e-6 * t + 5e-7 * (2.0 * t).sin();
+        let all = readings(400, 20, 2e-8, delay);
         let timeline = Timeline::new(&all, 0, FRAME, RATE_WALK).unwrap().unwrap();
-        let mut filter = DelayFilter::new(DelayState::known(Seconds(1e-5), 1e-7, 1e-4), RATE_WALK);
-        let (mut smoothed, mut filtered, mut predicted, mut stated) = (0.0, 0.0, 0.0, 0.0);
-        for reading in &all {
+        let (mut smoothed, mut stated) = (0.0, 0.0);
+        for reading in &all[60..340] {
             let time = FRAME * reading.frame as f64;
-            let (measured, sigma) = reading.delays[0].unwrap();
-            filter.update(DelayMeasurement { delay: measured, variance: sigma.0 * sigma.0 });
-            let state = filter.state();
-            let ahead = FRAME * 40.0;
-            if (60..340).contains(&(reading.frame / 20)) {
-                let known = timeline.at(time);
-                smoothed += (known.delay.0 - delay(time.0)).powi(2);
-                stated += known.delay_variance;
-                filtered += (state.delay.0 - delay(time.0)).powi(2);
-                predicted += (state.delay.0 + state.rate * ahead.0 - delay((time + ahead).0)).powi(2);
-            }
-            filter.advance(FRAME * 20.0);
+            let known = timeline.at(time);
+            smoothed += (known.delay.0 - delay(time.0)).powi(2);
+            stated += known.delay_variance;
         }
-        let ratio = |a: f64, b: f64| f64::sqrt(a / b);
-        assert!(ratio(smoothed, filtered) < 0.6, "{}", ratio(smoothed, filtered));
-        assert!(ratio(smoothed, predicted) < 0.45, "{}", ratio(smoothed, predicted));
-        assert!((0.6..1.5).contains(&ratio(smoothed, stated)), "{}", ratio(smoothed, stated));
+        let ratio = f64::sqrt(smoothed / stated);
+        assert!((0.6..1.5).contains(&ratio) && smoothed < 280.0 * 0.25 * 4e-16, "{ratio} {smoothed:e}");
     }
 
     #[test]
@@ -171,25 +143,8 @@ mod tests {
         assert!((known.delay.0 - 1e-5 - 3e-6 * 1.55).abs() < 4.0 * known.deviation().0, "{known:?}");
     }
 
-    /// Between two exact readings at the distance T the error of a parabola is |f''| a b / 2.
     #[test]
-    fn the_bound_between_two_readings_is_that_of_a_parabola() {
-        let delay = |t: f64| Some((Seconds(0.5e-6 * t * t), Seconds(1e-14)));
-        let all: Vec<Reading> =
-            [0, 4000].map(|f| Reading { frame: f, delays: vec![delay(1e-3 * f as f64)] }).into();
-        let timeline = Timeline::new(&all, 0, FRAME, RATE_WALK).unwrap().unwrap();
-        for t in [1.0, 2.0, 3.0] {
-            let miss = timeline.at(Seconds(t)).delay.0 - 0.5e-6 * t * t;
-            let bound = timeline.bound(Seconds(t), 1e-6).unwrap().0;
-            assert!((miss - 0.5e-6 * t * (4.0 - t)).abs() < 1e-10, "{miss:e}");
-            // Readings are rounded to whole frames, in which the delay moves by up to 3 ns.
-            assert!(miss < bound && bound < miss + 4e-9, "{t}: {miss:e} {bound:e}");
-        }
-        assert_eq!(timeline.bound(Seconds(4.1), 1e-6), None);
-    }
-
-    #[test]
-    fn one_reading_is_left_to_the_filter() {
+    fn one_reading_has_no_spline() {
         let all = readings(5, 20, 1e-8, |t| t);
         assert!(Timeline::new(&all[..1], 0, FRAME, RATE_WALK).unwrap().is_none());
     }

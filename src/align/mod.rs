@@ -8,14 +8,16 @@
 mod course;
 mod error;
 mod pieces;
+mod reading;
+mod state;
 #[cfg(test)]
 mod tests;
+mod timeline;
 
 pub use error::{AlignError, AlignWarning};
+pub use reading::Reading;
+pub use state::DelayState;
 
-use super::Reading;
-use super::filter::{Coincidence, DelayState};
-use super::source::LEAST_LEVEL;
 use crate::calibrate::{
     CalibrationSignal, ChannelEstimate, Fit, LagLine, Record, Settings, Warning, check, check_parts, line,
 };
@@ -24,6 +26,7 @@ use crate::spec::Spec;
 use crate::units::Seconds;
 use course::{Course, mean};
 use pieces::{PieceEstimate, Pieces};
+use state::Coincidence;
 
 /// Least samples that all recordings have in common.
 const LEAST_SAMPLES: usize = 1024;
@@ -38,8 +41,12 @@ const SHORT_PIECE: usize = 1024;
 const LEAST_PIECES: usize = 4;
 const MOST_PIECES: usize = 1024;
 
+/// Rms of a recording, relative to full scale, below which it holds nothing to measure by: less than half a
+/// step of 24 bits and of any converter.
+const LEAST_LEVEL: f64 = 1e-8;
+
 /// Variance by which the rate of a clock walks in a second, in (s/s)^2 / s, unless more is known: that of
-/// 1 ppm, as in [`Tracking`](super::Tracking).
+/// 1 ppm.
 pub const RATE_WALK: f64 = 1e-12;
 
 /// How recordings are aligned.
