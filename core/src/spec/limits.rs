@@ -112,7 +112,9 @@ pub(crate) fn check_delay(delay: Seconds, periods: FastPeriods) -> Result<(), Sp
         }
         false => format!("at most {MAX_LATENCY} fast periods are supported; check its unit"),
     };
-    Err(range(delay.0, "s", format!("it is {}; {rule}", periods)))
+    // Far beyond both ends the quotient is no number that says more.
+    let found = if periods.0.is_finite() { format!("it is {periods}; ") } else { String::new() };
+    Err(range(delay.0, "s", found + &rule))
 }
 
 /// N.
