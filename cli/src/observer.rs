@@ -145,8 +145,9 @@ fn gap_line(gaps: &[Gap]) -> Option<String> {
 impl RunObserver {
     /// Says an event, and writes it to the report.
     fn tell(&mut self, event: &str, data: &impl Serialize, text: &str) {
-        say_line(text);
+        // Whoever has read the line finds the event in the report.
         self.file.write(event, data);
+        say_line(text);
     }
 
     /// Reports an input that gives nothing, or does again.
@@ -180,8 +181,8 @@ impl RunObserver {
     /// What the comparison found, in a live run.
     fn warn(&mut self, found: &Agreement) {
         for text in found.warnings().iter().filter(|_| self.is_live) {
-            say_line(&format!("warning: {text}"));
             self.file.write("warning", &json!({ "text": text }));
+            say_line(&format!("warning: {text}"));
         }
     }
 

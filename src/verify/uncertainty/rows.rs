@@ -5,9 +5,7 @@ use super::super::VerifyError;
 use super::super::ball::Ball;
 use super::super::front_ends::{Equations, FrontEnds};
 use super::super::timeline::SamplingInstant;
-use super::slopes::{
-    PADE_REMAINDER, bounded_width, cutoff_slope, delay_curvature, delay_slope, pade_width, row_norm,
-};
+use super::slopes::{PADE_REMAINDER, cutoff_slope, delay_curvature, delay_slope, pade_width, row_norm};
 use crate::analog::CutoffRemainder;
 use crate::bank::Bank;
 use crate::spec::ErrorBox;
@@ -159,24 +157,18 @@ impl Remainders<'_> {
         })
     }
 
-    /// |R Phi| + |E x S|. The remainder of a Pade form of delta d is bounded for the error's own half-width; one
-    /// of a larger delta w differs from it by s d / (1 + s d / 2) times s (w - d) / 2 / (1 + s w / 2).
+    /// |R Phi| + |E x S|.
     fn of_slopes(&self, filter: usize, HalfWidths { delay, cutoff, .. }: HalfWidths) -> f64 {
         if delay.0 == 0.0 {
             return 0.0;
         }
-        let (delta, width, equations) =
-            (bounded_width(delay), pade_width(delay), self.nominal.filter(filter));
-        let curved = PADE_REMAINDER * delta.0.powi(2) * self.norm(delay_curvature(equations, delta, delta));
-        let wider = match width.0 - delta.0 {
-            0.0 => 0.0,
-            more => 0.5 * delta.0 * more * self.norm(delay_curvature(equations, width, delta)),
-        };
+        let (delta, equations) = (pade_width(delay), self.nominal.filter(filter));
+        let curved = PADE_REMAINDER * delta.0.powi(2) * self.norm(delay_curvature(equations, delta));
         let mixed = match cutoff {
             0.0 => 0.0,
             x => 2f64.sqrt() * x * delta.0 * self.norm(delay_slope(&cutoff_slope(equations), delta)),
         };
-        (curved + wider + mixed) * OUTWARD
+        (curved + mixed) * OUTWARD
     }
 
     /// |T| of a converter's own filter.

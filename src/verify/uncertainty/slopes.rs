@@ -22,14 +22,11 @@ use crate::units::{FastPeriods, GridTime, Seconds};
 
 /// C of the module's page. `the_pade_form_leaves_at_most_its_remainder` proves it.
 pub(super) const PADE_REMAINDER: f64 = 1.26;
-/// Smallest error whose remainder is bounded: smaller ones take the bound of this one, which holds for them
-/// too. It is below 1e-17, and 106 bits resolve it.
+/// Smallest delta of a Pade form: smaller errors take that of this one, which holds for them too. Its
+/// remainder is below 1e-17, and 106 bits resolve it.
 const LEAST_HALF_WIDTH: FastPeriods = FastPeriods(1e-9);
-/// Smallest delta of a Pade form in H': the pole 2 / delta of a smaller one is so far from those of smooth
-/// filters that double precision finds no certificate.
-const LEAST_PADE_WIDTH: FastPeriods = FastPeriods(1e-3);
 /// Powers of the transition are small from this row sum on, so that the sum over all of them is known.
-const SMALL_POWER: f64 = 1e-9;
+const SMALL_POWER: f64 = 1e-15;
 /// Doublings of the number of slow periods until then.
 const DOUBLINGS: usize = 20;
 /// Remainder of the sum over the past, relative to the rounding error of an operation.
@@ -43,13 +40,8 @@ const RESOLVED: f64 = 1e-2;
 /// Makes up for the roundings of a sum of bounds in double precision.
 const SUM_OUTWARD: f64 = 1.001;
 
-/// The delta of the Pade form in H' for an error of the delay.
+/// The delta of the Pade form for an error of the delay.
 pub(super) fn pade_width(half: FastPeriods) -> FastPeriods {
-    FastPeriods(half.0.max(LEAST_PADE_WIDTH.0))
-}
-
-/// The half-width for which a remainder is bounded.
-pub(super) fn bounded_width(half: FastPeriods) -> FastPeriods {
     FastPeriods(half.0.max(LEAST_HALF_WIDTH.0))
 }
 
@@ -60,10 +52,10 @@ pub(super) fn delay_slope(filter: &Equations, delta: FastPeriods) -> Equations {
     slope.then(&smoother(delta, [Ball::from(1.0), Ball::ZERO]))
 }
 
-/// s^2 / ((1 + s width / 2) (1 + s delta / 2)) times a strictly proper filter.
-pub(super) fn delay_curvature(filter: &Equations, width: FastPeriods, delta: FastPeriods) -> Equations {
+/// s^2 / (1 + s delta / 2)^2 times a strictly proper filter.
+pub(super) fn delay_curvature(filter: &Equations, delta: FastPeriods) -> Equations {
     let rate = rate(delta);
-    delay_slope(filter, width).then(&smoother(delta, [-rate, rate]))
+    delay_slope(filter, delta).then(&smoother(delta, [-rate, rate]))
 }
 
 /// c / (1 + s delta / 2) + d.
@@ -137,27 +129,35 @@ fn steady_state<F: Number>(transition: &Matrix<F>, gramian: &Matrix<F>) -> Optio
 }
 
 /// A bound on |c x| + 2 sum over n > 0 of |c E^n x|; `None` if that is not resolved.
+///
+/// The rows c E^n go on from their midpoints, since the radii of many products would grow without end. What
+/// that leaves out of a row reaches the later ones through powers of E, whose row sums are bounded by those
+/// of E, E^2, E^4, ..
 fn absolute_sum<F: Number>(row: &Matrix<F>, transition: &Matrix<F>, x: &Matrix<F>) -> Option<f64> {
-    let (mut power, mut periods) = (transition.clone(), 1);
+    let (mut power, mut periods, mut growth) = (transition.clone(), 1, 1.0f64);
+    // Unknown numbers are not small.
     let is_small = |power: &Matrix<F>| ball::row_sum(power) < SMALL_POWER;
     while !is_small(&power) {
         if periods >> DOUBLINGS > 0 {
             return None;
         }
+        growth *= ball::row_sum(&power).max(1.0);
         (power, periods) = (ball::product(&power, &power), 2 * periods);
     }
+    let largest = x.iter().map(|x| x.magnitude()).fold(0.0, ball::nan_max);
     let value = |row: &Matrix<F>| ball::product(row, x)[(0, 0)];
     let first = value(row);
     let (mut sum, mut radii, mut rows) = (first.magnitude(), first.radius(), 0.0);
-    let mut later = row.clone();
+    let (mut later, mut left_out) = (row.clone(), 0.0);
     for _ in 0..periods {
         later = ball::product(&later, transition);
-        let next = value(&later);
-        (sum, radii) = (sum + 2.0 * next.magnitude(), radii + 2.0 * next.radius());
-        rows += ball::row_sum(&later);
+        left_out += growth * ball::row_radii(&later)[0];
+        later = later.map(|x| Ball::exactly(x.mid()));
+        let (next, error) = (value(&later), left_out * largest);
+        (sum, radii) = (sum + 2.0 * (next.magnitude() + error), radii + 2.0 * (next.radius() + error));
+        rows += ball::row_sum(&later) + left_out;
     }
     // What is left are the same rows times powers of E^periods.
-    let largest = x.iter().map(|x| x.magnitude()).fold(0.0, ball::nan_max);
     let rest = 4.0 * SMALL_POWER * rows * largest;
     (radii + rest <= RESOLVED * sum).then_some((sum + rest) * SUM_OUTWARD)
 }
@@ -245,7 +245,7 @@ mod tests {
                     (equations.clone(), alias_norm(&written, 2, at)),
                     (delay_slope(&equations, delta), alias_norm(&written, 2, |f, nu| at(f, nu) * slope(nu))),
                     (
-                        delay_curvature(&equations, delta, delta),
+                        delay_curvature(&equations, delta),
                         alias_norm(&written, 2, |f, nu| at(f, nu) * slope(nu) * slope(nu)),
                     ),
                     (cutoff_slope(&equations), alias_norm(&written, 2, derivative)),
@@ -254,6 +254,17 @@ mod tests {
                     assert!(found >= 0.98 * sum && found < 2.0 * sum, "{family:?} {delta:?}: {found} {sum}");
                 }
             }
+        }
+    }
+
+    /// Small errors after a smooth filter: poles apart by nine decades, and Gramians of twenty.
+    #[test]
+    fn small_errors_after_smooth_filters_are_resolved() {
+        let equations = enclosed(None, &filter(Family::Chebyshev1, 8, 0.05), Seconds(1.0)).unwrap();
+        let norm = |delta: f64| row_norm(None, delay_curvature(&equations, FastPeriods(delta)), 2);
+        let largest = norm(1e-3);
+        for delta in [1e-5, 1e-7, 1e-9] {
+            assert!((norm(delta) / largest - 1.0).abs() < 1e-2, "{delta}: {} {largest}", norm(delta));
         }
     }
 
