@@ -100,7 +100,7 @@ pub(super) struct Args {
 /// The captures of one acquisition.
 struct Acquired {
     name: String,
-    /// One per channel.
+    /// One per sample of a frame.
     records: Vec<Record>,
 }
 
@@ -239,7 +239,7 @@ impl Args {
         if captures.is_cut {
             warnings.push(format!("{}: only the first {most} frames are used", Quoted(&captures.name)));
         }
-        Ok(Acquired { records: captures.records(converters.layout(), self.clip), name: captures.name })
+        Ok(Acquired { records: captures.records(self.clip), name: captures.name })
     }
 
     fn settings(&self, spec: &Spec) -> Result<Settings, Failure> {

@@ -27,7 +27,7 @@ impl CaptureCheck {
         let channels = bank.channel_count();
         let most = if is_live { ENOUGH_FRAMES } else { usize::MAX };
         match comparable(bank.spec.as_ref(), is_steady) {
-            Err(reason) => Self::Done(Verdict::Incomparable(reason).into()),
+            Err(verdict) => Self::Done(verdict.into()),
             Ok(spec) => Self::Collecting {
                 spec: Box::new(spec.clone()),
                 samples: vec![Vec::new(); channels],

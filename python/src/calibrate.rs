@@ -41,7 +41,7 @@ pub(crate) fn calibrate<'py>(
     if clip.is_some_and(|level| level.is_nan() || level <= 0.0) {
         return Err(refused("clip: give a positive level"));
     }
-    let records = held.captures()?.records(&layout, clip);
+    let records = held.captures()?.records(clip);
     let settings = Settings { fit: fitted(&fit)?, reference: reference_of(&spec, reference)? };
     let nominal = spec.clone();
     let found =

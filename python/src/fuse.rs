@@ -72,7 +72,7 @@ pub(crate) fn plan(
 fn judged(bank: &Bank, held: &Held<'_>) -> PyResult<Agreement> {
     let spec = match comparable(bank.spec.as_ref(), !held.format.complex) {
         Ok(spec) => spec.clone(),
-        Err(reason) => return Ok(Verdict::Incomparable(reason).into()),
+        Err(verdict) => return Ok(verdict.into()),
     };
     let most = frames_for_agreement(spec.channels.len());
     let channels = OfflineSamples::of_frames(&held.recordings()?, most).channels;

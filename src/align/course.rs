@@ -2,7 +2,7 @@
 
 use super::pieces::PieceEstimate;
 use super::timeline::Timeline;
-use super::{AlignSettings, AlignWarning, AlignedChannel, DelayState, Reading, Stretches};
+use super::{AlignSettings, AlignWarning, AlignedChannel, Reading, Stretches};
 use crate::calibrate::{Calibration, ChannelEstimate, Warning, applied};
 use crate::sine_fit::Estimate;
 use crate::spec::{HALF_WIDTH, Spec};
@@ -67,7 +67,7 @@ impl<'a> Course<'a> {
         let slow = h * spec.ratio as f64;
         let timeline = |i: usize| match i == settings.reference {
             true => Some(None),
-            false => Timeline::new(&readings, i, slow, settings.rate_walk).ok()?.map(Some),
+            false => Timeline::new(&readings, i, slow, settings.rate_walk).map(Some),
         };
         let timelines = (0..spec.channels.len()).map(timeline).collect::<Option<_>>()?;
         let &Stretches { first, end, .. } = stretches;
@@ -83,10 +83,10 @@ impl<'a> Course<'a> {
     }
 
     /// What is known of a delay at a sample of the reference.
-    fn at(&self, i: usize, sample: f64) -> DelayState {
+    fn at(&self, i: usize, sample: f64) -> Estimate<Seconds> {
         match &self.timelines[i] {
             Some(timeline) => timeline.at(self.slow_period() * sample),
-            None => DelayState::known(self.spec.channels[i].delay, 0.0, 0.0),
+            None => Estimate { value: self.spec.channels[i].delay, sigma: Seconds(0.0) },
         }
     }
 
@@ -95,8 +95,8 @@ impl<'a> Course<'a> {
         let states = (0..=INSTANTS).map(|k| self.at(i, self.first + step * f64::from(k)));
         let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
         for state in states {
-            let half = state.deviation().0 * HALF_WIDTH;
-            (least, most) = (least.min(state.delay.0 - half), most.max(state.delay.0 + half));
+            let half = state.sigma.0 * HALF_WIDTH;
+            (least, most) = (least.min(state.value.0 - half), most.max(state.value.0 + half));
         }
         Extent { middle: Seconds(0.5 * (least + most)), half: Seconds(0.5 * (most - least)) }
     }
@@ -108,7 +108,7 @@ impl<'a> Course<'a> {
         let early = |i: usize| {
             let Extent { middle, half } = self.extent(i);
             let is_long = half > slow * WHOLE_PERIOD;
-            let delay = if is_long { self.at(i, self.first).delay } else { middle };
+            let delay = if is_long { self.at(i, self.first).value } else { middle };
             ((delay - self.spec.channels[i].delay) / slow).round() as i64
         };
         let early: Vec<i64> = (0..self.spec.channels.len()).map(early).collect();
@@ -123,8 +123,8 @@ impl<'a> Course<'a> {
 
     /// The delay at the first frame after the cut.
     pub(super) fn delay(&self, i: usize, skips: &[usize]) -> Estimate<Seconds> {
-        let state = self.at(i, skips[self.settings.reference] as f64);
-        Estimate { value: state.delay - self.cut(i, skips), sigma: state.deviation() }
+        let Estimate { value, sigma } = self.at(i, skips[self.settings.reference] as f64);
+        Estimate { value: value - self.cut(i, skips), sigma }
     }
 
     /// By how much the clock is fast: the slope of the line that is closest to the delays. Their first and

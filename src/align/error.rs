@@ -1,7 +1,7 @@
 //! Why recordings cannot be aligned, and what a reader of an alignment must know.
 
-use crate::calibrate::{CalibrateError, NoLag, Warning};
-use crate::units::{FastPeriods, Seconds};
+use crate::calibrate::{CalibrateError, Warning};
+use crate::units::FastPeriods;
 
 /// Why recordings cannot be aligned.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -102,34 +102,9 @@ pub enum AlignWarning {
         /// Largest minus smallest delay.
         moved: FastPeriods,
     },
-    /// Two channels come to sample at one instant.
-    #[error(
-        "{at:.3} after the first frame the channels {} and {} sample at one instant: no bank recovers the signal there. \
-         Leave that stretch out, or use more recorders than the ratio",
-        channels[0], channels[1]
-    )]
-    Coincidence {
-        /// From 1.
-        channels: [usize; 2],
-        /// Time from the first frame on.
-        at: Seconds,
-    },
     /// What the values mean.
     #[error(transparent)]
     Values(#[from] Warning),
-}
-
-impl AlignError {
-    /// Of two channels, from 1, whose lag is not found.
-    pub(super) fn no_lag(why: NoLag, reference: usize, channel: usize) -> Self {
-        match why {
-            NoLag::NothingInCommon => Self::NothingInCommon { reference, channel },
-            NoLag::Ambiguous(lags) => {
-                let lags = lags.into_iter().map(|lag| lag.round() as i64).collect();
-                Self::Ambiguous { reference, channel, lags }
-            }
-        }
-    }
 }
 
 fn numbers(lags: &[i64]) -> String {

@@ -9,14 +9,12 @@ mod course;
 mod error;
 mod pieces;
 mod reading;
-mod state;
 #[cfg(test)]
 mod tests;
 mod timeline;
 
 pub use error::{AlignError, AlignWarning};
 pub use reading::Reading;
-pub use state::DelayState;
 
 use crate::calibrate::{
     CalibrationSignal, ChannelEstimate, Fit, LagLine, Record, Settings, Warning, check, check_parts, line,
@@ -26,7 +24,6 @@ use crate::spec::Spec;
 use crate::units::Seconds;
 use course::{Course, mean};
 use pieces::{PieceEstimate, Pieces};
-use state::Coincidence;
 
 /// Least samples that all recordings have in common.
 const LEAST_SAMPLES: usize = 1024;
@@ -118,7 +115,11 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
     let within = within.map_or(f64::INFINITY, |time| time / (spec.fast_period * spec.ratio as f64));
     let line = |i: usize| {
         let found = (i != reference).then(|| line(&records[reference], &records[i], within));
-        found.transpose().map_err(|why| AlignError::no_lag(why, reference + 1, i + 1))
+        let (reference, channel) = (reference + 1, i + 1);
+        found.transpose().map_err(|lags| match lags.is_empty() {
+            true => AlignError::NothingInCommon { reference, channel },
+            false => AlignError::Ambiguous { reference, channel, lags },
+        })
     };
     let lines = (0..records.len()).map(line).collect::<Result<Vec<_>, _>>()?;
     let stretches = Stretches::new(records, reference, &lines)?;
@@ -206,23 +207,6 @@ fn alignment(
     let measured = estimates.len();
     let (spec, raised) = course.spec(&channels, &mut warnings);
     channels.iter_mut().for_each(|channel| channel.delay.value += spec.fast_period * raised as f64);
-    warnings.extend(coincidence(&spec, &channels, frames));
     let readings = course.readings(&skips, raised);
     Alignment { reference, channels, frames, pieces, measured, readings, spec, warnings }
-}
-
-/// Two channels that sample at one instant while the recordings last; with more channels than needed nothing
-/// is lost by that.
-fn coincidence(spec: &Spec, channels: &[AlignedChannel], frames: usize) -> Option<AlignWarning> {
-    if channels.len() > spec.ratio {
-        return None;
-    }
-    let state = |channel: &AlignedChannel| DelayState {
-        rate: channel.drift.value,
-        ..DelayState::known(channel.delay.value, channel.delay.sigma.0, channel.drift.sigma)
-    };
-    let states: Vec<DelayState> = channels.iter().map(state).collect();
-    let lasts = spec.fast_period * (spec.ratio * frames) as f64;
-    let Coincidence { channels, after } = Coincidence::ahead(&states, spec, lasts)?;
-    Some(AlignWarning::Coincidence { channels: channels.map(|i| i + 1), at: after })
 }

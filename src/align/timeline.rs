@@ -1,9 +1,9 @@
 //! Delays at any instant from readings that are known beforehand.
 
 use super::reading::Reading;
-use super::state::DelayState;
+use crate::sampling::SmoothingSpline;
 use crate::sampling::nonuniform::Measured;
-use crate::sampling::{SamplingError, SmoothingSpline};
+use crate::sine_fit::Estimate;
 use crate::units::Seconds;
 
 /// Readings beyond this many standard deviations of what the others say are refused.
@@ -25,16 +25,9 @@ pub(super) struct Timeline {
 }
 
 impl Timeline {
-    /// Of channel `i`, with the time of a frame. `None` with readings of fewer than two frames.
-    ///
-    /// # Errors
-    /// [`SamplingError`] if no spline goes through the readings.
-    pub(super) fn new(
-        readings: &[Reading],
-        i: usize,
-        frame: Seconds,
-        rate_walk: f64,
-    ) -> Result<Option<Self>, SamplingError> {
+    /// Of channel `i`, with the time of a frame. `None` if no spline goes through the readings, and with
+    /// those of fewer than two frames.
+    pub(super) fn new(readings: &[Reading], i: usize, frame: Seconds, rate_walk: f64) -> Option<Self> {
         let of = |reading: &Reading| {
             let (delay, sigma) = reading.delays[i]?;
             let (x, jitter) = (reading.frame as f64 * frame.0, TIME_ROUNDING * frame.0);
@@ -43,7 +36,7 @@ impl Timeline {
         let mut all: Vec<(u64, Measured)> = readings.iter().filter_map(of).collect();
         let has_two_frames = all.iter().any(|sample| sample.0 != all[0].0);
         if !has_two_frames {
-            return Ok(None);
+            return None;
         }
         let mut refused = Vec::new();
         for _ in 0..ROUNDS {
@@ -51,25 +44,19 @@ impl Timeline {
             let worst = contradictory(&spline);
             // Without two instants nothing is left to be judged by.
             if worst.is_empty() || all.len() < worst.len() + 2 {
-                return Ok(Some(Self { spline, refused }));
+                return Some(Self { spline, refused });
             }
             for k in worst.into_iter().rev() {
                 refused.push(all.remove(k).0);
             }
         }
-        Ok(Some(Self { spline: spline(&all, rate_walk)?, refused }))
+        Some(Self { spline: spline(&all, rate_walk)?, refused })
     }
 
-    /// What is known at a time.
-    pub(super) fn at(&self, time: Seconds) -> DelayState {
+    /// The delay at a time.
+    pub(super) fn at(&self, time: Seconds) -> Estimate<Seconds> {
         let known = self.spline.at(time.0);
-        DelayState {
-            delay: Seconds(known.value),
-            rate: known.slope,
-            delay_variance: known.variance,
-            covariance: known.covariance,
-            rate_variance: known.slope_variance,
-        }
+        Estimate { value: Seconds(known.value), sigma: Seconds(known.variance.sqrt()) }
     }
 
     /// Whether the readings of a frame were refused.
@@ -78,8 +65,8 @@ impl Timeline {
     }
 }
 
-fn spline(samples: &[(u64, Measured)], rate_walk: f64) -> Result<SmoothingSpline, SamplingError> {
-    SmoothingSpline::new(samples.iter().map(|sample| sample.1).collect(), rate_walk)
+fn spline(samples: &[(u64, Measured)], rate_walk: f64) -> Option<SmoothingSpline> {
+    SmoothingSpline::new(samples.iter().map(|sample| sample.1).collect(), rate_walk).ok()
 }
 
 /// The samples that contradict the others, each the worst of those beside it.
@@ -118,13 +105,13 @@ mod tests {
     fn the_stated_error_is_that_of_the_delays() {
         let delay = |t: f64| 1e-5 + 3e-6 * t + 5e-7 * (2.0 * t).sin();
         let all = readings(400, 20, 2e-8, delay);
-        let timeline = Timeline::new(&all, 0, FRAME, RATE_WALK).unwrap().unwrap();
+        let timeline = Timeline::new(&all, 0, FRAME, RATE_WALK).unwrap();
         let (mut smoothed, mut stated) = (0.0, 0.0);
         for reading in &all[60..340] {
             let time = FRAME * reading.frame as f64;
             let known = timeline.at(time);
-            smoothed += (known.delay.0 - delay(time.0)).powi(2);
-            stated += known.delay_variance;
+            smoothed += (known.value.0 - delay(time.0)).powi(2);
+            stated += known.sigma.0.powi(2);
         }
         let ratio = f64::sqrt(smoothed / stated);
         assert!((0.6..1.5).contains(&ratio) && smoothed < 280.0 * 0.25 * 4e-16, "{ratio} {smoothed:e}");
@@ -136,25 +123,24 @@ mod tests {
         for k in [3, 77, 78, 150] {
             all[k].delays[0].as_mut().unwrap().0 += Seconds(1e-6);
         }
-        let timeline = Timeline::new(&all, 0, FRAME, RATE_WALK).unwrap().unwrap();
+        let timeline = Timeline::new(&all, 0, FRAME, RATE_WALK).unwrap();
         let refused: Vec<u64> = (0..200).filter(|k| timeline.refuses(20 * k)).collect();
         assert_eq!(refused, [3, 77, 78, 150]);
         let known = timeline.at(Seconds(1.55));
-        assert!((known.delay.0 - 1e-5 - 3e-6 * 1.55).abs() < 4.0 * known.deviation().0, "{known:?}");
+        assert!((known.value.0 - 1e-5 - 3e-6 * 1.55).abs() < 4.0 * known.sigma.0, "{known:?}");
     }
 
     #[test]
     fn one_reading_has_no_spline() {
         let all = readings(5, 20, 1e-8, |t| t);
-        assert!(Timeline::new(&all[..1], 0, FRAME, RATE_WALK).unwrap().is_none());
+        assert!(Timeline::new(&all[..1], 0, FRAME, RATE_WALK).is_none());
     }
 
-    /// A reading whose interval is no number leaves no spline, which is an error and not a missing timeline.
+    /// Nor has a reading whose interval is no number.
     #[test]
-    fn readings_without_a_spline_are_an_error() {
+    fn readings_without_numbers_have_no_spline() {
         let mut all = readings(5, 20, 1e-8, |t| t);
         all[2].delays[0].as_mut().unwrap().1 = Seconds(f64::NAN);
-        let refused = Timeline::new(&all, 0, FRAME, RATE_WALK).unwrap_err();
-        assert!(matches!(refused, SamplingError::NotFinite { .. }), "{refused}");
+        assert!(Timeline::new(&all, 0, FRAME, RATE_WALK).is_none());
     }
 }

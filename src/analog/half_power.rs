@@ -8,18 +8,9 @@ const PER_DECADE: f64 = 100.0;
 /// Halvings of the interval around an edge.
 const HALVINGS: usize = 50;
 
-/// Where |Phi'| is within 3 dB of its largest value, from the lowest such frequency to the highest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HalfPowerBand {
-    /// 0 for a low-pass.
-    pub low: RadiansPerFastPeriod,
-    /// The -3 dB frequency of a low-pass, the upper one of a band-pass.
-    pub high: RadiansPerFastPeriod,
-}
-
 impl StableFilter {
     /// The band within 3 dB of the largest gain.
-    pub fn half_power_band(&self) -> HalfPowerBand {
+    pub fn half_power_band(&self) -> [RadiansPerFastPeriod; 2] {
         let gain = |w: f64| self.response(RadiansPerFastPeriod(w)).norm();
         let frequencies = self.searched();
         let level = frequencies.iter().map(|&w| gain(w)).fold(gain(0.0), f64::max) * 0.5_f64.sqrt();
@@ -35,7 +26,7 @@ impl StableFilter {
             Some(&above) => edge(passes, frequencies[last], above),
             None => frequencies[last],
         };
-        HalfPowerBand { low: RadiansPerFastPeriod(low), high: RadiansPerFastPeriod(high) }
+        [low, high].map(RadiansPerFastPeriod)
     }
 
     /// Frequencies from far below the slowest pole to far above the fastest, and those of the poles.
@@ -68,7 +59,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     fn upper_edge(filter: &FilterSpec) -> f64 {
-        StrictlyProper::new(filter, Seconds(1.0)).unwrap().half_power_band().high.0
+        StrictlyProper::new(filter, Seconds(1.0)).unwrap().half_power_band()[1].0
     }
 
     #[test]
@@ -94,7 +85,7 @@ mod tests {
             let filter = FilterSpec::TransferFunction { num: vec![1.0, 0.0], den: vec![1.0, 1.0 / q, 1.0] };
             let band = StrictlyProper::new(&filter, Seconds(1.0)).unwrap().half_power_band();
             let want = [-1.0, 1.0].map(|sign| ((1.0 + 4.0 * q * q).sqrt() + sign) / (2.0 * q));
-            for (found, want) in [band.low.0, band.high.0].into_iter().zip(want) {
+            for (found, want) in band.map(|w| w.0).into_iter().zip(want) {
                 assert!((found / want - 1.0).abs() < 1e-9, "{q}: {found} {want}");
             }
         }

@@ -44,7 +44,6 @@ pub(crate) use signal::{SignalFilter, resolved_band, signal};
 pub(crate) use strictly_proper::enclosed;
 
 pub use error::AnalogError;
-pub use half_power::HalfPowerBand;
 pub use strictly_proper::{StableFilter, StrictlyProper};
 
 /// Least -Re(p)/|p| of a pole: a quality factor of 5e8. Eigenvalues of a realisation are not known to

@@ -15,17 +15,11 @@ use super::{AnalogError, MAX_GAIN, MAX_NORMALISED_POLE, MIN_DAMPING_RATIO, MIN_G
 /// State equations dx/dt' = a x + b f, out = c x + d f with a: n x n, b: n x 1, c: 1 x n, all dimensionless.
 /// The gain is that of the written filter: Phi'(s') = Phi(s'/h). Two filters are equal when their normalised
 /// poles, zeros and gains are (for state-space forms: their matrices), in whatever form they were written.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct StableFilter {
     chain: Chain<f64>,
     poles: Vec<Complex<f64>>,
     realisation: Realisation<f64>,
-}
-
-impl PartialEq for StableFilter {
-    fn eq(&self, other: &Self) -> bool {
-        self.chain == other.chain
-    }
 }
 
 impl StableFilter {

@@ -63,9 +63,15 @@ pub enum Verdict {
     /// There is one channel, or there are too many.
     #[error("captures are compared with the spec for 2 to {MOST_CHANNELS} channels")]
     Channels,
-    /// They cannot be compared.
-    #[error(transparent)]
-    Incomparable(Incomparable),
+    /// Complex samples, or delays that are followed.
+    #[error("captures are not compared with the spec where they are complex or their delays are followed")]
+    Unsteady,
+    /// Converters have rates of their own.
+    #[error("captures of converters with rates of their own are not compared with the spec")]
+    OwnRates,
+    /// There is no spec.
+    #[error("the bank carries no spec with which the captures could be compared")]
+    NoSpec,
     /// Nothing compared them.
     #[error("the captures were not compared with the spec")]
     Unjudged,
@@ -95,31 +101,16 @@ impl Agreement {
     }
 }
 
-/// Why captures are not compared with a spec.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum Incomparable {
-    /// Complex samples, or delays that are followed.
-    #[error("captures are not compared with the spec where they are complex or their delays are followed")]
-    Unsteady,
-    /// Converters have rates of their own.
-    #[error("captures of converters with rates of their own are not compared with the spec")]
-    OwnRates,
-    /// There is no spec.
-    #[error("the bank carries no spec with which the captures could be compared")]
-    NoSpec,
-}
-
 /// The spec of a bank with which captures can be compared. They are steady if they are real and their delays
 /// are not followed.
 ///
 /// # Errors
-/// [`Incomparable`].
-pub fn comparable(spec: Option<&Spec>, is_steady: bool) -> Result<&Spec, Incomparable> {
+/// The [`Verdict`] that says why captures cannot be compared.
+pub fn comparable(spec: Option<&Spec>, is_steady: bool) -> Result<&Spec, Verdict> {
     match spec {
-        _ if !is_steady => Err(Incomparable::Unsteady),
-        None => Err(Incomparable::NoSpec),
-        Some(spec) if !spec.layout().is_plain() => Err(Incomparable::OwnRates),
+        _ if !is_steady => Err(Verdict::Unsteady),
+        None => Err(Verdict::NoSpec),
+        Some(spec) if !spec.layout().is_plain() => Err(Verdict::OwnRates),
         Some(spec) => Ok(spec),
     }
 }

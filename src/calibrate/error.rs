@@ -33,10 +33,10 @@ pub enum CalibrateError {
         tone: Hertz,
     },
     /// A filter of the spec cannot be realised.
-    #[error("filter of channel {channel}: {source}")]
-    Analog {
-        /// The channel, from 1.
-        channel: usize,
+    #[error("filter of {place}: {source}")]
+    Filter {
+        /// A channel or the target.
+        place: String,
         /// Why.
         source: Box<AnalogError>,
     },
@@ -61,12 +61,6 @@ pub enum CalibrateError {
         channel: usize,
         /// From 1.
         stage: usize,
-        /// Why.
-        source: Box<AnalogError>,
-    },
-    /// The target's filter cannot be realised.
-    #[error("filter of the target: {source}")]
-    Target {
         /// Why.
         source: Box<AnalogError>,
     },
@@ -220,7 +214,7 @@ pub enum CalibrateError {
         acquisitions: usize,
     },
     /// An acquisition of several without any of the given tones.
-    #[error("it holds none of the tones given; its lines appear at {}", hertz(lines))]
+    #[error("it holds none of the tones given; its lines appear at {}", list(lines))]
     NoneOfTheTones {
         /// Where its lines appear, below half the slow rate.
         lines: Vec<Hertz>,
@@ -288,14 +282,9 @@ impl CalibrateError {
     }
 }
 
-/// Numbers in a sentence.
-pub(super) fn list(order: &[usize]) -> String {
-    order.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
-}
-
-/// Frequencies in a sentence.
-fn hertz(list: &[Hertz]) -> String {
-    list.iter().map(Hertz::to_string).collect::<Vec<_>>().join(", ")
+/// Numbers or frequencies in a sentence.
+pub(super) fn list(items: &[impl ToString]) -> String {
+    items.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
 impl From<NoMinimum> for CalibrateError {

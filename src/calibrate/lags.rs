@@ -258,18 +258,12 @@ impl LagLine {
     }
 }
 
-/// Why there is no lag.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum NoLag {
-    /// No lag stands out.
-    NothingInCommon,
-    /// These explain the recordings alike.
-    Ambiguous(Vec<f64>),
-}
-
 /// How much later `other` comes than `reference`, `within` so many samples. Probes of the shorter recording
 /// are looked for in the longer one: they are all there if it is a part.
-pub(crate) fn line(reference: &Record, other: &Record, within: f64) -> Result<LagLine, NoLag> {
+///
+/// # Errors
+/// The lags, in samples, that explain the recordings alike; none if no lag stands out.
+pub(crate) fn line(reference: &Record, other: &Record, within: f64) -> Result<LagLine, Vec<i64>> {
     if reference.samples.len() <= other.samples.len() {
         return likeliest(&lags(&probes(reference), other, within));
     }
@@ -278,8 +272,8 @@ pub(crate) fn line(reference: &Record, other: &Record, within: f64) -> Result<La
 }
 
 /// The line on which most of the likely lags lie.
-fn likeliest(lags: &[Lag]) -> Result<LagLine, NoLag> {
-    let Some(&(best, line)) = lines(lags).first() else { return Err(NoLag::NothingInCommon) };
+fn likeliest(lags: &[Lag]) -> Result<LagLine, Vec<i64>> {
+    let Some(&(best, line)) = lines(lags).first() else { return Err(Vec::new()) };
     let others: Vec<Lag> = lags.iter().filter(|lag| !line.holds(lag)).copied().collect();
     let mut alike = vec![line.lag];
     for (odds, other) in lines(&others) {
@@ -296,8 +290,8 @@ fn likeliest(lags: &[Lag]) -> Result<LagLine, NoLag> {
     }
     // A signal that repeats correlates with itself at many lags, none of which stands out.
     let highest = lags.iter().map(|lag| lag.height).fold(0.0, f64::max);
-    alike.truncate(PEAKS);
-    Err(if highest < IN_COMMON { NoLag::NothingInCommon } else { NoLag::Ambiguous(alike) })
+    let named = if highest < IN_COMMON { 0 } else { PEAKS };
+    Err(alike.iter().take(named).map(|lag| lag.round() as i64).collect())
 }
 
 /// The lines through one lag or two, the likeliest first, with their log-odds.

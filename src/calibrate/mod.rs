@@ -52,14 +52,12 @@ mod tones;
 mod warning;
 mod waveform;
 
-pub use agreement::{
-    Agreement, ENOUGH_FRAMES, Incomparable, Verdict, agreement, comparable, frames_for_agreement,
-};
+pub use agreement::{Agreement, ENOUGH_FRAMES, Verdict, agreement, comparable, frames_for_agreement};
 pub use contradiction::Contradiction;
 pub use error::CalibrateError;
 pub use estimates::{Calibration, ChannelEstimate, Tone, applied};
 pub use fit::Fit;
-pub(crate) use lags::{Correlation, LagLine, NoLag, line, steadied, stretch};
+pub(crate) use lags::{Correlation, LagLine, line, steadied, stretch};
 pub(crate) use model::Model;
 pub(crate) use record::longest_run;
 pub use record::{Acquisition, Record};
@@ -70,6 +68,7 @@ pub use crate::spec::{Cutoff, Fitting, UnknownFitting};
 use crate::spec::{Spec, UncertaintySpec};
 use crate::units::{FastPeriods, Hertz};
 use estimates::Fitted;
+use std::ops::Range;
 
 /// No converter that is in order has a larger offset, relative to full scale.
 const MOST_OFFSET: f64 = 0.1;
@@ -110,7 +109,7 @@ pub fn usual_reference(spec: &Spec) -> usize {
 }
 
 /// Calibrates the channels of `spec` by `records`, one per channel in the order of the spec, whose samples
-/// of one index belong to one frame; of converters with rates of their own as many in a row as make a frame.
+/// of one index belong to one frame; of a converter with several samples per frame one for each of them.
 ///
 /// # Errors
 /// [`CalibrateError`].
@@ -163,8 +162,10 @@ pub fn calibrate_pooled(
     {
         return Err(CalibrateError::WrongOrder { order });
     }
-    let clipped_in = |i: usize| acquisitions.iter().map(move |one| one.records[i].clipped).sum();
-    let clipped: Vec<usize> = (0..spec.channels.len()).map(clipped_in).collect();
+    let clipped_in = |samples: Range<usize>| {
+        acquisitions.iter().flat_map(|one| &one.records[samples.clone()]).map(|record| record.clipped).sum()
+    };
+    let clipped: Vec<usize> = spec.layout().ranges().into_iter().map(clipped_in).collect();
     if clipped.iter().any(|&count| count > 0) {
         fitted.warnings.push(Warning::Clipped { counts: clipped.clone() });
     }
@@ -205,9 +206,9 @@ pub(crate) fn check_parts(records: &[Record], signal: &CalibrationSignal) -> Res
 
 /// Refuses records and settings that do not belong to a spec.
 pub(crate) fn check(spec: &Spec, records: &[Record], settings: Settings) -> Result<(), CalibrateError> {
-    let channels = spec.channels.len();
-    if records.len() != channels {
-        return Err(CalibrateError::ChannelCount { channels, records: records.len() });
+    let (channels, needed) = (spec.channels.len(), spec.layout().count());
+    if records.len() != needed {
+        return Err(CalibrateError::ChannelCount { channels: needed, records: records.len() });
     }
     if channels < 2 {
         return Err(CalibrateError::OneChannel);

@@ -49,11 +49,10 @@ impl Model {
     /// The model of `spec`.
     ///
     /// # Errors
-    /// [`CalibrateError::Analog`] for a filter that cannot be realised.
+    /// [`CalibrateError::Filter`] for a filter that cannot be realised.
     pub(crate) fn new(spec: &Spec) -> Result<Self, CalibrateError> {
         let realise = |(i, channel): (usize, &ChannelSpec)| {
-            StrictlyProper::new(&channel.filter, spec.fast_period)
-                .map_err(|source| CalibrateError::Analog { channel: i + 1, source: Box::new(source) })
+            realised(&channel.filter, spec.fast_period, &format!("channel {}", i + 1))
         };
         Ok(Self {
             ratio: spec.ratio,
@@ -163,6 +162,11 @@ impl Stage {
     }
 }
 
+fn realised(filter: &FilterSpec, h: Seconds, place: &str) -> Result<StrictlyProper, CalibrateError> {
+    let refused = |source| CalibrateError::Filter { place: place.to_owned(), source: Box::new(source) };
+    StrictlyProper::new(filter, h).map_err(refused)
+}
+
 /// The Nyquist zone of the fast rate, from 0, of the middle of the signal's band; without one of the
 /// frequency that the target passes best, where it is a band-pass.
 fn fast_zone(spec: &Spec) -> Result<usize, CalibrateError> {
@@ -170,8 +174,7 @@ fn fast_zone(spec: &Spec) -> Result<usize, CalibrateError> {
     let middle = match band {
         Some(Band { low, high }) => 0.5 * (low + high).per_fast_period(spec.fast_period).0,
         None => {
-            let target = StrictlyProper::new(&spec.target, spec.fast_period)
-                .map_err(|source| CalibrateError::Target { source: Box::new(source) })?;
+            let target = realised(&spec.target, spec.fast_period, "the target")?;
             let gain = |w: f64| target.response(RadiansPerFastPeriod(w)).norm();
             let resonances = target.poles().iter().map(|pole| pole.im.abs());
             let best = resonances.max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(0.0);

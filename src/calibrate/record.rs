@@ -6,13 +6,13 @@ use std::ops::Range;
 /// Least share of equal samples in two records of the same recording.
 const SAME_SAMPLES_SHARE: f64 = 0.999;
 
-/// Captures that were taken together: one record per channel, whose samples of one index belong to one
-/// frame.
+/// Captures that were taken together: one record for each sample of a frame, whose samples of one index
+/// belong to one frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Acquisition<'a> {
     /// What it is called in messages.
     pub name: &'a str,
-    /// In the order of the spec.
+    /// In the order of the spec, with those of one converter one after the other.
     pub records: &'a [Record],
 }
 
@@ -76,35 +76,6 @@ impl Record {
     /// The samples, or the real and the imaginary parts of complex ones.
     pub(super) fn parts(&self) -> impl Iterator<Item = &[f64]> {
         std::iter::once(self.samples.as_slice()).chain(self.imaginary.as_deref())
-    }
-
-    /// The record of a converter with several samples per frame, from one record of each of them.
-    pub fn in_a_row(records: &[Self]) -> Self {
-        let frames = records.iter().map(|one| one.samples.len()).min().unwrap_or(0);
-        let row = |of: fn(&Self) -> &[f64]| -> Vec<f64> {
-            (0..frames).flat_map(|k| records.iter().map(move |one| of(one)[k])).collect()
-        };
-        let is_complex = records.iter().all(|one| one.imaginary.is_some());
-        Self {
-            samples: row(|one| &one.samples),
-            imaginary: is_complex.then(|| row(|one| one.imaginary.as_deref().unwrap_or_default())),
-            keep: (0..frames).flat_map(|k| records.iter().map(move |one| one.keep[k])).collect(),
-            clipped: records.iter().map(|one| one.clipped).sum(),
-        }
-    }
-
-    /// The samples of each place in frames of `samples`, one after the other.
-    pub(super) fn of_frames(&self, samples: usize) -> Vec<Self> {
-        let whole = self.samples.len() / samples * samples;
-        let each =
-            |part: &[f64], first: usize| part[..whole].iter().skip(first).step_by(samples).copied().collect();
-        let of = |first: usize| Self {
-            samples: each(&self.samples, first),
-            imaginary: self.imaginary.as_ref().map(|part| each(part, first)),
-            keep: self.keep[..whole].iter().skip(first).step_by(samples).copied().collect(),
-            clipped: if first == 0 { self.clipped } else { 0 },
-        };
-        (0..samples).map(of).collect()
     }
 
     /// Some of the samples, as far as there are so many.

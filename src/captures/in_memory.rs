@@ -1,7 +1,6 @@
 //! All channels of captures.
 
 use super::{CaptureError, ChannelSamples};
-use crate::bank::FrameLayout;
 use crate::calibrate::Record;
 use crate::io::{MultiReader, OfflineSamples, PcmFrames, StreamHeader};
 use crate::units::Hertz;
@@ -59,13 +58,9 @@ impl Captures {
         }
     }
 
-    /// A record for each converter, some of whose samples are [clipped](ChannelSamples::record).
-    pub fn records(&self, layout: &FrameLayout, clip: Option<f64>) -> Vec<Record> {
-        let records: Vec<Record> = self.channels.iter().map(|channel| channel.record(clip)).collect();
-        if layout.is_plain() {
-            return records;
-        }
-        layout.ranges().into_iter().map(|samples| Record::in_a_row(&records[samples])).collect()
+    /// A record for each channel, some of whose samples are [clipped](ChannelSamples::record).
+    pub fn records(&self, clip: Option<f64>) -> Vec<Record> {
+        self.channels.iter().map(|channel| channel.record(clip)).collect()
     }
 }
 

@@ -210,22 +210,13 @@ impl Design {
         if search == ProofSearch::Run {
             let begin = Instant::now();
             self.proof = prove::attach_proof(&mut self.bank, stop);
-            if self.proof.is_ok() {
-                // `verify` proves it only with the rest.
-                self.prove_worst_case(stop);
+            // `verify` proves the worst case only with the rest.
+            if self.proof.is_ok() && self.robust.is_some() {
+                self.box_unproven = prove::attach_box_proof(&mut self.bank, stop).err();
             }
             self.proof_time = begin.elapsed();
         }
         self
-    }
-}
-
-impl Design {
-    /// States the worst case over the box of the spec of a robust bank, or says why there is none.
-    fn prove_worst_case(&mut self, stop: &Stop) {
-        if self.robust.is_some() {
-            self.box_unproven = prove::attach_box_proof(&mut self.bank, stop).err();
-        }
     }
 }
 

@@ -48,16 +48,12 @@ fn lags_of_recursion(bank: &Bank) -> Vec<Mat> {
 
 /// `F(e^{j w}) = sum_n f[n] e^{-j w n}` and its group delay, `-d arg F / d w`, in fast samples.
 pub fn fir_response(taps: &[f64], w: RadiansPerFastPeriod) -> (Complex<f64>, f64) {
-    let term = |(n, tap): (usize, &f64)| {
+    let (mut response, mut moment) = (Complex::<f64>::ZERO, Complex::<f64>::ZERO);
+    for (n, tap) in taps.iter().enumerate() {
         let value = Complex::from_polar(*tap, -w.0 * n as f64);
-        (value, value * n as f64)
-    };
-    let sum =
-        taps.iter().enumerate().map(term).fold(
-            (Complex::new(0.0, 0.0), Complex::new(0.0, 0.0)),
-            |(response, moment), (value, weighted)| (response + value, moment + weighted),
-        );
-    (sum.0, (sum.1 / sum.0).re)
+        (response, moment) = (response + value, moment + value * n as f64);
+    }
+    (response, (moment / response).re)
 }
 
 /// |Phi(2 pi f)| of the target and of each channel, gains included, at these frequencies.

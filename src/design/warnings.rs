@@ -50,9 +50,9 @@ fn band(spec: &Spec, problem: &Problem, channel: Option<usize>) -> Option<String
     };
     let place = channel.map_or_else(|| "the target".to_owned(), |i| format!("channel {}", i + 1));
     let band = problem.front_ends[front_end].half_power_band();
-    let [low, edge] = [band.low.0, band.high.0].map(|w| Hertz(w / TAU / spec.fast_period.0));
+    let [low, edge] = band.map(|w| Hertz(w.0 / TAU / spec.fast_period.0));
     let nyquist = Hertz(0.5 / spec.fast_period.0);
-    if band.high.0 < NARROW_BAND * PI {
+    if band[1].0 < NARROW_BAND * PI {
         let share = edge.0 / nyquist.0;
         return Some(format!(
             "{place}: -3 dB at {}, {share:.2e} of the output's Nyquist frequency {}; {}",
@@ -64,8 +64,8 @@ fn band(spec: &Spec, problem: &Problem, channel: Option<usize>) -> Option<String
     // A track-and-hold may be wider than the output's band, the filter of the ideal converter may not,
     // unless the signal is narrower.
     let may_be_wide = channel.is_some() || spec.signal.is_some();
-    let multiple = folding_multiple([band.low, band.high]).filter(|_| !may_be_wide)?;
-    Some(if band.low.0 == 0.0 {
+    let multiple = folding_multiple(band).filter(|_| !may_be_wide)?;
+    Some(if band[0].0 == 0.0 {
         format!(
             "{place}: -3 dB at {}, above the output's Nyquist frequency {}; what lies above it aliases, also in the ideal \
              converter",

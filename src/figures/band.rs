@@ -37,10 +37,8 @@ impl FigureBand {
         if let Some(Band { low, high }) = spec.signal.as_ref().and_then(|signal| signal.band()) {
             return Self { low_hertz: low, high_hertz: high, source: BandSource::Signal };
         }
-        let edges = |filter: &StableFilter| {
-            let band = filter.half_power_band();
-            [band.low, band.high].map(|w| Hertz(w.0 / TAU / spec.fast_period.0))
-        };
+        let edges =
+            |filter: &StableFilter| filter.half_power_band().map(|w| Hertz(w.0 / TAU / spec.fast_period.0));
         if let Ok(Some(filter)) = signal(spec) {
             let [low_hertz, high_hertz] = edges(&filter);
             return Self { low_hertz, high_hertz, source: BandSource::Signal };

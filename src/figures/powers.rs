@@ -14,12 +14,12 @@ const MOST_WORK: f64 = 1e9;
 const ANGLES: std::ops::RangeInclusive<f64> = 120.0..=40_000.0;
 
 /// What a mean square error is computed for.
-pub(super) struct Conditions<'a> {
+pub(super) struct Conditions {
     /// The signal.
-    pub(super) signal: &'a Signal,
-    /// s_i^2 of each channel, in the scale of the signal's unit density.
+    pub(super) signal: Signal,
+    /// s_i^2 of each channel, in the scale of the signal.
     pub(super) noise: Vec<f64>,
-    /// How far each converter is from the spec.
+    /// How far each converter is from the spec; offsets are in the scale of the signal.
     pub(super) spread: Vec<Deviations>,
 }
 
@@ -47,7 +47,7 @@ pub(super) fn target_power(signal: &Signal) -> f64 {
     power.first().copied().unwrap_or(0.0) / signal.problem().ratio as f64
 }
 
-impl Conditions<'_> {
+impl Conditions {
     /// The mean squares of the errors of all `ways`, at the same angles.
     pub(super) fn powers(&self, ways: &[Reconstruction]) -> Vec<Powers> {
         let problem = self.signal.problem();

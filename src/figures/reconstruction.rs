@@ -3,9 +3,8 @@
 
 use super::signal::Columns;
 use super::spline::Spline;
-use crate::design::Problem;
 use crate::design::filters::FilterResponse;
-use crate::design::{NearestSample, nearest_samples};
+use crate::design::{NearestSample, Problem, nearest_samples};
 use crate::linalg::{self, CMat, Complex};
 use std::ops::Range;
 

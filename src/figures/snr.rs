@@ -51,13 +51,10 @@ impl Ratios {
 
 /// The signal, the noise and the uncertainty for which ratios are computed.
 pub(super) struct Setting {
-    signal: Signal,
+    /// The noise is that of the spec, or that of 16 bits.
+    conditions: Conditions,
     target: f64,
-    /// Of the converters, in the scale of the signal: as the spec says, or that of 16 bits.
-    noise: Vec<f64>,
     noise_is_stated: bool,
-    /// Of the converters; offsets are in the scale of the signal.
-    spread: Vec<Deviations>,
 }
 
 impl Setting {
@@ -95,12 +92,12 @@ impl Setting {
         };
         let scaled = |spread: Deviations| Deviations { offset: spread.offset * full_scale.sqrt(), ..spread };
         let spread = Deviations::of_spec(spec).into_iter().map(scaled).collect();
-        Ok(Self { signal, target, noise, noise_is_stated, spread })
+        Ok(Self { conditions: Conditions { signal, noise, spread }, target, noise_is_stated })
     }
 
     /// The front ends, with the spectrum of the signal where it is a filter.
     pub(super) fn problem(&self) -> &Problem {
-        self.signal.problem()
+        self.conditions.signal.problem()
     }
 
     /// The ratio of the bank itself.
@@ -114,16 +111,14 @@ impl Setting {
 
     /// The ratios of several ways.
     pub(super) fn ratios(&self, ways: &[Reconstruction]) -> Vec<Ratios> {
-        let conditions =
-            Conditions { signal: &self.signal, noise: self.noise.clone(), spread: self.spread.clone() };
-        conditions.powers(ways).iter().map(|powers| self.ratio(powers)).collect()
+        self.conditions.powers(ways).iter().map(|powers| self.ratio(powers)).collect()
     }
 
     fn ratio(&self, powers: &Powers) -> Ratios {
         let Powers { signal, late, gains, offsets, noise, .. } = *powers;
         let db = |power: f64| Decibels::of_power(self.target / power);
         let of = |error: fn(&Deviations) -> f64, power: f64| {
-            self.spread.iter().any(|spread| error(spread) > 0.0).then(|| db(power.max(0.0)))
+            self.conditions.spread.iter().any(|spread| error(spread) > 0.0).then(|| db(power.max(0.0)))
         };
         let all = late + gains + offsets;
         let stated = if self.noise_is_stated { noise } else { 0.0 };

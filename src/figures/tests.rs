@@ -82,9 +82,9 @@ fn simple_ways_have_the_digits_of_another_program() {
         let signal = Signal::in_band(plain.clone(), 0.0..=TAU * system.band);
         let channels = system.delays.len();
         let spread = vec![Deviations::default(); channels];
-        let conditions = Conditions { signal: &signal, noise: vec![0.0; channels], spread };
-        let ways = simple::ways(&plain);
         let target = target_power(&signal);
+        let conditions = Conditions { signal, noise: vec![0.0; channels], spread };
+        let ways = simple::ways(&plain);
         let ratios: Vec<Ratios> = conditions
             .powers(&ways)
             .iter()
@@ -146,7 +146,7 @@ fn errors_of_noise_and_of_uncertain_delays_have_the_digits_of_covariances() {
         let spread = [0.0, spread]
             .map(|delay| Deviations { delay: FastPeriods(delay), ..Deviations::default() })
             .to_vec();
-        let conditions = Conditions { signal: &signal, noise: plain.noise, spread };
+        let conditions = Conditions { signal, noise: plain.noise, spread };
         let powers = conditions
             .powers(&[Reconstruction::Bank(FilterResponse::new(&bank.filters, bank.ratio).unwrap())])[0];
         let rms = (powers.late + powers.noise).sqrt();
@@ -163,8 +163,9 @@ fn the_error_from_white_noise_is_that_of_the_error_system() {
     {
         let bank = system.bank(design);
         let signal = Signal::everywhere(without_signal(bank.spec.as_ref().unwrap(), bank.latency).unwrap());
+        let target = target_power(&signal);
         let conditions = Conditions {
-            signal: &signal,
+            signal,
             noise: vec![1.0; bank.channel_count()],
             spread: vec![Deviations::default(); bank.channel_count()],
         };
@@ -175,7 +176,7 @@ fn the_error_from_white_noise_is_that_of_the_error_system() {
         assert!((rms / mean.rms_error - 1.0).abs() < accuracy, "{rms} {}", mean.rms_error);
         assert!((powers.noise.sqrt() / mean.noise_gain - 1.0).abs() < 1e-4);
         let scale = crate::design::GammaScale::new(&bank, &[]).unwrap();
-        assert!((target_power(&signal).sqrt() / scale.rms_reference - 1.0).abs() < accuracy);
+        assert!((target.sqrt() / scale.rms_reference - 1.0).abs() < accuracy);
     }
 }
 

@@ -2,9 +2,8 @@
 
 use super::ExportError;
 use super::bit_true::IntegerFilters;
-use super::layout::{PolyphaseTaps, SparseBlock};
-use crate::bank::{Bank, FixedPoint, SynthesisFilters};
-use std::fmt::Display;
+use super::layout::{PolyphaseTaps, sparse_rows};
+use crate::bank::{Bank, FixedPoint, StateSpace, SynthesisFilters};
 
 /// Numbers per line of a table.
 const PER_LINE: usize = 4;
@@ -17,7 +16,7 @@ pub(super) fn header(bank: &Bank, name: &str, input_bits: Option<u32>) -> Result
     let body = match (&bank.filters, &bank.fixed_point) {
         (SynthesisFilters::Fir(_), Some(words)) => integer_fir(bank, words, name, input_bits)?,
         (SynthesisFilters::Fir(taps), None) => real_fir(bank, &PolyphaseTaps::new(taps, bank.ratio), name),
-        (SynthesisFilters::StateSpace(block), _) => recursive(bank, &SparseBlock::new(block), name),
+        (SynthesisFilters::StateSpace(block), _) => recursive(bank, block, name),
     };
     let guard = format!("{}_H", name.to_ascii_uppercase());
     Ok(format!("{}#ifndef {guard}\n#define {guard}\n\n{body}\n#endif\n", about(bank, name)))
@@ -84,10 +83,6 @@ fn double(value: &f64) -> String {
     format!("{value:e}")
 }
 
-fn decimal(value: &impl Display) -> String {
-    value.to_string()
-}
-
 fn real_fir(bank: &Bank, taps: &PolyphaseTaps<f64>, name: &str) -> String {
     fir(&Fir {
         name,
@@ -138,7 +133,7 @@ fn integer_fir(
         taps.ratio,
         table(&filters.constants, constant),
         taps.channels,
-        table(&filters.resting, decimal)
+        table(&filters.resting, ToString::to_string)
     );
     Ok(fir(&Fir {
         name,
@@ -154,7 +149,7 @@ fn integer_fir(
         number: "int64_t",
         sample: "int32_t",
         tap: "int32_t",
-        taps: table(&taps.values, decimal),
+        taps: table(&taps.values, ToString::to_string),
         constants: of_offsets(constants),
         reset: of_offsets(reset),
         sample_of: "input[i]".to_owned(),
@@ -240,8 +235,9 @@ fn fir(parts: &Fir<'_>) -> String {
     )
 }
 
-fn recursive(bank: &Bank, block: &SparseBlock, name: &str) -> String {
-    let SparseBlock { states, inputs, outputs, rows } = block;
+fn recursive(bank: &Bank, block: &StateSpace, name: &str) -> String {
+    let (rows, states) = (sparse_rows(block), block.a.len());
+    let (inputs, outputs) = (bank.frame_samples(), bank.ratio);
     let starts: Vec<usize> = std::iter::once(0)
         .chain(rows.iter().scan(0, |end, row| {
             *end += row.len();
@@ -270,14 +266,14 @@ fn recursive(bank: &Bank, block: &SparseBlock, name: &str) -> String {
          for (int i = 0; i < {inputs}; i++) z[{states} + i] = input[i] - {name}_offsets[i];\n    \
          for (int p = 0; p < {outputs}; p++) output[p] = {name}_row(z, {states} + p);\n    \
          for (int i = 0; i < {states}; i++) state->x[i] = {name}_row(z, i);\n}}\n",
-        count = block.nonzero(),
+        count = rows.iter().map(Vec::len).sum::<usize>(),
         length = columns.len(),
         values = table(&values, double),
-        columns = table(&columns, decimal),
+        columns = table(&columns, ToString::to_string),
         boundaries = starts.len(),
-        starts = table(&starts, decimal),
+        starts = table(&starts, ToString::to_string),
         offsets = table(&bank.layout().each(&bank.offsets), double),
-        width = (*states).max(1),
+        width = states.max(1),
         all = states + inputs,
     )
 }

@@ -102,8 +102,8 @@ pub enum ExportError {
         /// The array.
         name: &'static str,
         /// Its rows.
-        rows: u64,
+        rows: usize,
         /// Its columns.
-        columns: u64,
+        columns: usize,
     },
 }

@@ -42,33 +42,11 @@ impl<T: Copy + Default + PartialEq> PolyphaseTaps<T> {
     }
 }
 
-/// The rows of `[a b; c d]` without their zeros.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SparseBlock {
-    /// n.
-    pub states: usize,
-    /// N.
-    pub inputs: usize,
-    /// M.
-    pub outputs: usize,
-    /// For each row, states first, the columns of `[x; u]` with their coefficients.
-    pub rows: Vec<Vec<(usize, f64)>>,
-}
-
-impl SparseBlock {
-    /// Of a bank's state-space filters.
-    pub fn new(block: &StateSpace) -> Self {
-        let states = block.a.len();
-        let row = |(left, right): (&Vec<f64>, &Vec<f64>)| {
-            left.iter().chain(right).copied().enumerate().filter(|&(_, value)| value != 0.0).collect()
-        };
-        let state_rows = block.a.iter().zip(&block.b);
-        let rows: Vec<_> = state_rows.chain(block.c.iter().zip(&block.d)).map(row).collect();
-        Self { states, inputs: block.d.first().map_or(0, Vec::len), outputs: block.d.len(), rows }
-    }
-
-    /// Coefficients that are not zero.
-    pub fn nonzero(&self) -> usize {
-        self.rows.iter().map(Vec::len).sum()
-    }
+/// The rows of `[a b; c d]` without their zeros: for each, states first, the columns of `[x; u]` with their
+/// coefficients.
+pub fn sparse_rows(block: &StateSpace) -> Vec<Vec<(usize, f64)>> {
+    let row = |(left, right): (&Vec<f64>, &Vec<f64>)| {
+        left.iter().chain(right).copied().enumerate().filter(|&(_, value)| value != 0.0).collect()
+    };
+    block.a.iter().zip(&block.b).chain(block.c.iter().zip(&block.d)).map(row).collect()
 }

@@ -34,7 +34,7 @@ mod verilog;
 
 pub use bit_true::{BitTrue, WordSizes};
 pub use error::ExportError;
-pub use layout::{PolyphaseTaps, SparseBlock};
+pub use layout::{PolyphaseTaps, sparse_rows};
 pub use read_taps::{TapsError, taps_of_csv, taps_of_npy};
 pub use sections::{Section, block_of_sections, sections};
 pub use verilog::{Circuit, MOST_RANDOM_FRAMES, Verilog, VerilogOptions};
@@ -63,13 +63,6 @@ pub enum Format {
     Verilog,
 }
 
-impl Format {
-    /// Whether integer taps are written as code for integer samples.
-    fn is_integer_code(self, bank: &Bank) -> bool {
-        matches!(self, Self::C99 | Self::Coe | Self::Mem | Self::Verilog) && bank.fixed_point.is_some()
-    }
-}
-
 /// The bytes of `bank` in `format`. `name` is the prefix of the C identifiers. Integer code subtracts the
 /// offsets from samples of `input_bits`, of which 2^(`input_bits` - 1) is full scale; without offsets it may
 /// have any bits.
@@ -82,7 +75,8 @@ pub fn export(
     name: &str,
     input_bits: Option<u32>,
 ) -> Result<Vec<u8>, ExportError> {
-    if input_bits.is_some() && !format.is_integer_code(bank) {
+    let is_code = matches!(format, Format::C99 | Format::Coe | Format::Mem | Format::Verilog);
+    if input_bits.is_some() && !(is_code && bank.fixed_point.is_some()) {
         return Err(ExportError::NoWords);
     }
     match format {

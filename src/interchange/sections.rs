@@ -37,13 +37,13 @@ impl Section {
 ///
 /// ```
 /// use hybank::bank::{Bank, SynthesisFilters};
-/// use hybank::interchange::{SparseBlock, block_of_sections, sections};
+/// use hybank::interchange::{block_of_sections, sections};
 /// let bank = Bank::from_json(include_str!("../../filters/thesis-iir.json"), "thesis-iir.json")?;
 /// let list = sections(&bank)?;
 /// // The product of two poles.
 /// assert!(list.iter().all(|section| section.a[1].abs() < 1.0));
-/// let block = SparseBlock::new(&block_of_sections(&list, bank.frame_samples(), bank.ratio));
-/// assert_eq!((block.inputs, block.outputs), (2, 2));
+/// let block = block_of_sections(&list, bank.frame_samples(), bank.ratio);
+/// assert_eq!((block.d.len(), block.d[0].len()), (2, 2));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///

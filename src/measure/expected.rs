@@ -73,11 +73,6 @@ impl Cause {
     pub fn is_interleaving(self) -> bool {
         matches!(self, Self::Offset { .. } | Self::GainOrSkew { .. } | Self::HarmonicImage { .. })
     }
-
-    /// True for harmonics.
-    pub fn is_harmonic(self) -> bool {
-        matches!(self, Self::Harmonic { .. })
-    }
 }
 
 impl fmt::Display for Cause {

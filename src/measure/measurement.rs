@@ -254,7 +254,7 @@ impl Figures<'_> {
             enob,
             enob_full_scale: enob + 0.5 * (0.5 * full_scale * full_scale / signal).log2(),
             snr: Decibels::of_power(signal / self.lines.noise_power),
-            thd: total(&|cause| cause.is_harmonic()),
+            thd: total(&|cause| matches!(cause, Cause::Harmonic { .. })),
             harmonics,
             interleaving: is_turned.then(|| total(&|cause| cause.is_interleaving())),
             sfdr: self.sfdr(|_| true),

@@ -58,10 +58,7 @@ impl Window {
             let (b1, b2) = a[1..].iter().rev().fold((0.0, 0.0), |(b1, b2), a| (a + 2.0 * x * b1 - b2, b1));
             a[0] + x * b1 - b2
         };
-        match self {
-            Self::None => samples.to_vec(),
-            _ => samples.iter().enumerate().map(|(n, x)| x * value(n)).collect(),
-        }
+        samples.iter().enumerate().map(|(n, x)| x * value(n)).collect()
     }
 }
 

@@ -93,16 +93,10 @@ fn tones(bank: &Bank) -> Result<Chart, DesignError> {
         label: label.into(),
         points: tones.iter().map(|(hertz, tone)| (hertz.0 * factor, decibels(of(tone)))).collect(),
     };
-    Ok(Chart {
-        title: "Images and error of gain".into(),
-        x_label: format!("input {x_label}"),
-        y_label: "relative to the tone, dB".into(),
-        series: vec![
-            curve("largest image", |tone| tone.image),
-            curve("error of gain and phase", |tone| tone.gain_error),
-        ],
-        ..Chart::default()
-    })
+    let (image, gain_error) =
+        (curve("largest image", |tone| tone.image), curve("error of gain and phase", |tone| tone.gain_error));
+    let (title, x_label) = ("Images and error of gain", format!("input {x_label}"));
+    Ok(Chart::lines(title, x_label, "relative to the tone, dB", vec![image, gain_error]))
 }
 
 fn decibels(gain: f64) -> f64 {
@@ -164,14 +158,12 @@ fn of_target_and_channels(bank: &Bank, title: &str, frequencies: &[Hertz], all: 
             .collect(),
     };
     let count = 1 + bank.channel_count().min(MOST_CHANNELS - 1);
-    Chart {
-        title: title.into(),
-        x_label,
-        x_scale: AxisScale::Decades,
-        y_label: "gain, dB".into(),
-        series: (0..count).map(curve).collect(),
-        ..Chart::default()
-    }
+    over_decades(title, x_label, (0..count).map(curve).collect())
+}
+
+/// Gains over decades of the frequency.
+fn over_decades(title: &str, x_label: String, series: Vec<Series>) -> Chart {
+    Chart { x_scale: AxisScale::Decades, ..Chart::lines(title, x_label, "gain, dB", series) }
 }
 
 /// One curve per channel of a function of its response and group delay.
@@ -203,28 +195,15 @@ fn gains(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
     let frequencies = decades(nyquist(bank));
     let (x_label, series) =
         by_frequency(bank, responses, &frequencies, |response, _| decibels(response.norm()));
-    Chart {
-        title: "Gain of the synthesis filters".into(),
-        x_label,
-        x_scale: AxisScale::Decades,
-        y_label: "gain, dB".into(),
-        series,
-        ..Chart::default()
-    }
+    over_decades("Gain of the synthesis filters", x_label, series)
 }
 
 fn group_delays(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
     let least = pass_band(bank, responses);
     let delay = |response: Complex<f64>, delay: f64| if response.norm() >= least { delay } else { f64::NAN };
     let (x_label, series) = by_frequency(bank, responses, &evenly(bank), delay);
-    let y_label = "group delay, fast samples".to_owned();
-    Chart {
-        title: "Group delay of the synthesis filters, where they pass".into(),
-        x_label,
-        y_label,
-        series,
-        ..Chart::default()
-    }
+    let title = "Group delay of the synthesis filters, where they pass";
+    Chart::lines(title, x_label, "group delay, fast samples", series)
 }
 
 /// The phases without jumps of whole turns; where a filter does not pass they have no meaning.
@@ -239,14 +218,7 @@ fn phases(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
             last = *phase;
         }
     }
-    let y_label = "phase, rad".to_owned();
-    Chart {
-        title: "Phase of the synthesis filters, where they pass".into(),
-        x_label,
-        y_label,
-        series,
-        ..Chart::default()
-    }
+    Chart::lines("Phase of the synthesis filters, where they pass", x_label, "phase, rad", series)
 }
 
 /// The least gain at which a filter passes.
@@ -261,13 +233,8 @@ fn impulses(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
         label,
         points: taps.iter().enumerate().map(|(n, tap)| (n as f64, *tap)).collect(),
     };
-    Chart {
-        title: "Impulse responses of the synthesis filters".into(),
-        x_label: "fast samples".into(),
-        y_label: "tap".into(),
-        series: filter_names(bank).into_iter().zip(responses).take(MOST_CHANNELS).map(curve).collect(),
-        ..Chart::default()
-    }
+    let series = filter_names(bank).into_iter().zip(responses).take(MOST_CHANNELS).map(curve).collect();
+    Chart::lines("Impulse responses of the synthesis filters", "fast samples", "tap", series)
 }
 
 fn error(bank: &Bank) -> Result<Chart, DesignError> {
@@ -286,14 +253,8 @@ fn error(bank: &Bank) -> Result<Chart, DesignError> {
             points: ends.iter().map(|f| (f.0 * factor, decibels(bound))).collect(),
         }));
     }
-    let title = "Largest gain from the signal's source to the error".to_owned();
-    Ok(Chart {
-        title,
-        x_label: x_label + ", modulo the slow rate",
-        y_label: "gain, dB (h = 1)".into(),
-        series,
-        ..Chart::default()
-    })
+    let title = "Largest gain from the signal's source to the error";
+    Ok(Chart::lines(title, x_label + ", modulo the slow rate", "gain, dB (h = 1)", series))
 }
 
 /// gamma where the delay of one channel is off.
@@ -309,11 +270,7 @@ fn delay_error(bank: &Bank) -> Result<Chart, DesignError> {
         let points = (-DELAY_ERRORS..=DELAY_ERRORS).map(|step| gamma(channel, step));
         Ok(Series { label: format!("channel {}", channel + 1), points: points.collect::<Result<_, _>>()? })
     };
-    Ok(Chart {
-        title: "gamma with a delay that is not that of the bank".into(),
-        x_label: "error of the delay, fast samples".into(),
-        y_label: "gamma (h = 1)".into(),
-        series: (0..bank.channel_count().min(MOST_CHANNELS)).map(curve).collect::<Result<_, _>>()?,
-        ..Chart::default()
-    })
+    let series = (0..bank.channel_count().min(MOST_CHANNELS)).map(curve).collect::<Result<_, _>>()?;
+    let title = "gamma with a delay that is not that of the bank";
+    Ok(Chart::lines(title, "error of the delay, fast samples", "gamma (h = 1)", series))
 }

@@ -113,13 +113,8 @@ impl Scale {
     }
 
     fn chart(&self, title: String, window: Window, series: Vec<Series>) -> Chart {
-        Chart {
-            title,
-            x_label: format!("frequency ({})", self.unit),
-            y_label: format!("dBFS (window: {:.2} bins of noise)", window.noise_bandwidth()),
-            series,
-            ..Chart::default()
-        }
+        let y_label = format!("dBFS (window: {:.2} bins of noise)", window.noise_bandwidth());
+        Chart::lines(title, format!("frequency ({})", self.unit), y_label, series)
     }
 
     fn level(&self, amplitude: f64) -> f64 {

@@ -40,9 +40,9 @@ fn rates(spec: &Spec) -> String {
 
 fn target(spec: &Spec) -> Option<String> {
     let band = StrictlyProper::new(&spec.target, spec.fast_period).ok()?.half_power_band();
-    let edges = [band.low.0, band.high.0].map(|w| two_digits(w / PI));
-    let hertz = [band.low.0, band.high.0].map(|w| readable(w / TAU / spec.fast_period.0, "Hz"));
-    let (share, hertz) = if band.low.0 == 0.0 {
+    let edges = band.map(|w| two_digits(w.0 / PI));
+    let hertz = band.map(|w| readable(w.0 / TAU / spec.fast_period.0, "Hz"));
+    let (share, hertz) = if band[0].0 == 0.0 {
         (format!("{} of Nyquist", edges[1]), hertz[1].clone())
     } else {
         (format!("{} and {} of Nyquist", edges[0], edges[1]), hertz.join(" and "))

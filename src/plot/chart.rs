@@ -95,6 +95,17 @@ pub enum PlotError {
 }
 
 impl Chart {
+    /// Lines over linear axes.
+    pub fn lines(
+        title: impl Into<String>,
+        x_label: impl Into<String>,
+        y_label: impl Into<String>,
+        series: Vec<Series>,
+    ) -> Self {
+        let (title, x_label, y_label) = (title.into(), x_label.into(), y_label.into());
+        Self { title, x_label, y_label, series, ..Self::default() }
+    }
+
     /// The chart as SVG text.
     pub fn to_svg(&self) -> Result<String, PlotError> {
         let ranges = self.ranges()?;

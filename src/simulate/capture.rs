@@ -5,8 +5,7 @@ use super::response::{Instants, sample};
 use super::source::NormalisedSource;
 use super::walk::sample_at;
 use crate::analog::StrictlyProper;
-use crate::design::Problem;
-use crate::design::{NearestSample, nearest_samples};
+use crate::design::{NearestSample, Problem, nearest_samples};
 use crate::units::FastPeriods;
 
 /// An analog signal in normalised time.

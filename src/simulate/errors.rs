@@ -1,6 +1,7 @@
 //! How the virtual converters of a spec differ from what it says, with the limits of that.
 
 use super::{Analog, Converter, Quantiser};
+use crate::design::uncertainty::{Refused, of};
 use crate::quantity::Time;
 use crate::spec::{
     ChannelCount, ChannelSpec, Cutoff, Fitting, MAX_LATENCY, Spec, SpecProblem, check_noise, check_offset,
@@ -95,15 +96,8 @@ pub struct VirtualConverter {
     pub converter: Converter,
 }
 
-/// Errors of converters that are refused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{rule}")]
-pub struct RefusedError {
-    /// The field of [`ConverterErrors`].
-    pub field: &'static str,
-    /// Why.
-    pub rule: ErrorRule,
-}
+/// A field of [`ConverterErrors`] that is refused.
+pub type RefusedError = Refused<ErrorRule>;
 
 /// A rule for the errors of converters.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -152,11 +146,6 @@ impl From<SpecProblem> for ErrorRule {
     fn from(problem: SpecProblem) -> Self {
         Self::Number(Box::new(problem))
     }
-}
-
-/// Names the field of a refusal.
-fn of<T>(field: &'static str, result: Result<T, impl Into<ErrorRule>>) -> Result<T, RefusedError> {
-    result.map_err(|rule| RefusedError { field, rule: rule.into() })
 }
 
 impl ConverterErrors {

@@ -1,9 +1,9 @@
 //! The response of a front end to an analytic source, exact to rounding at any uniformly spaced instants.
 
-use super::source::{NormalisedSource, Source, Tone};
+use super::source::{NormalisedSource, Source};
 use super::walk::{panel_rate, sample_at, sum};
 use crate::analog::StrictlyProper;
-use crate::linalg::{self, Complex, Mat};
+use crate::linalg::{self, Mat};
 use crate::units::FastPeriods;
 
 /// The instants first + n step, n = 0 .. count.
@@ -32,21 +32,12 @@ impl Instants {
 pub fn sample(filter: &StrictlyProper, source: &NormalisedSource, instants: Instants) -> Vec<f64> {
     match source {
         Source::Step { at, height } => step(filter, at.0, *height, instants),
-        Source::Tones(list) => tones(filter, list, instants),
-        Source::Chirp { .. } => {
+        Source::Tones(_) | Source::Chirp { .. } => {
             let times: Vec<FastPeriods> = (0..instants.count).map(|n| instants.at(n)).collect();
             sample_at(filter, source, &times)
         }
         Source::Sum(terms) => sum(instants.count, terms.iter().map(|term| sample(filter, term, instants))),
     }
-}
-
-/// Steady state: amplitude |Phi(j omega)| cos(omega t + phase + arg Phi(j omega)).
-fn tones(filter: &StrictlyProper, tones: &[Tone<FastPeriods>], instants: Instants) -> Vec<f64> {
-    let phasors: Vec<(f64, Complex<f64>)> =
-        tones.iter().map(|tone| (tone.omega.0, tone.response(filter))).collect();
-    let value = |t: f64| phasors.iter().map(|(omega, p)| (p * Complex::from_polar(1.0, omega * t)).re).sum();
-    (0..instants.count).map(|n| value(instants.at(n).0)).collect()
 }
 
 /// The state and the constant input form one autonomous system, (x, u)' = [A B; 0 0] (x, u), so A need not

@@ -38,7 +38,7 @@ pub fn find_tones(
     let largest = Power::of(&records).largest;
     while tones.len() < most {
         let power = Power::of(&records);
-        let Some(cycles) = power.peak(0.0..0.5, largest) else { break };
+        let Some(cycles) = power.maximum(0.0..0.5, largest) else { break };
         let starts: Vec<Hertz> = tones.iter().copied().chain([rate * cycles]).collect();
         let found = match fit(channels, rate, &starts) {
             Err(error) if tones.is_empty() => return Err(error),
@@ -120,13 +120,6 @@ impl Power {
             bins.iter_mut().zip(&spectrum).for_each(|(bin, x)| *bin += x.norm_sqr());
         }
         Self { bins, length, largest }
-    }
-
-    /// The largest significant peak with an alias in `range`, in cycles per sample, interpolated. `largest`
-    /// is the size of the samples, which bounds the rounding errors.
-    fn peak(&self, range: Range<f64>, largest: f64) -> Option<f64> {
-        let at = self.largest_bin(range)?;
-        self.is_significant(at, largest).then(|| self.interpolated(at))
     }
 
     /// The same, if it is a maximum: the skirt of a line outside the range is none. Its bin may be the next

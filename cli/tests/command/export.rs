@@ -3,7 +3,7 @@
 
 use crate::support::{Desk, THESIS, number, text};
 use hybank::bank::{Bank, SynthesisFilters};
-use hybank::interchange::{PolyphaseTaps, SparseBlock};
+use hybank::interchange::{PolyphaseTaps, sparse_rows};
 use std::process::Command;
 
 /// Compiles the header `bank.h` of the desk with a program that pipes samples of `sample` through it.
@@ -167,14 +167,14 @@ fn c_of_recursive_banks_has_the_bits_of_its_definition() {
     let input = samples(2 * 500);
     let got = doubles(&piped(&desk, bytes(&input)));
     let SynthesisFilters::StateSpace(block) = bank(&desk).filters else { panic!("a recursive bank") };
-    let sparse = SparseBlock::new(&block);
-    let mut x = vec![0.0; sparse.states];
+    let (rows, states) = (sparse_rows(&block), block.a.len());
+    let mut x = vec![0.0; states];
     let mut want = Vec::new();
     for u in input.chunks_exact(2) {
         let z = [&x[..], u].concat();
-        let row = |k: usize| sparse.rows[k].iter().fold(0.0, |sum, &(j, value)| sum + value * z[j]);
-        want.extend((0..2).map(|p| row(sparse.states + p)));
-        x = (0..sparse.states).map(row).collect();
+        let row = |k: usize| rows[k].iter().fold(0.0, |sum, &(j, value)| sum + value * z[j]);
+        want.extend((0..2).map(|p| row(states + p)));
+        x = (0..states).map(row).collect();
     }
     assert!(got.iter().zip(&want).all(|(a, b)| a.to_bits() == b.to_bits()) && got.len() == want.len());
     assert!(worst_difference(&got, &streamed(&desk, &input)) < 1e-12);

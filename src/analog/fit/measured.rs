@@ -1,11 +1,14 @@
 //! A response on a list of frequencies.
 
 use super::MeasurementError;
-use super::text::{MOST_POINTS, Point, read_table};
+use super::text::{Point, read_table};
 use super::touchstone;
 use crate::linalg::Complex;
 use crate::units::{Hertz, Seconds};
 use std::f64::consts::TAU;
+
+/// Most frequencies of a measurement.
+const MOST_POINTS: usize = 100_000;
 
 /// Values H(j 2 pi f) at frequencies that rise.
 #[derive(Debug, Clone, PartialEq)]

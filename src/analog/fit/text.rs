@@ -4,9 +4,6 @@ use super::MeasurementError;
 use crate::linalg::Complex;
 use crate::units::Hertz;
 
-/// Most frequencies of a measurement.
-pub(super) const MOST_POINTS: usize = 100_000;
-
 /// A line, counted from 1, with its frequency and value.
 pub(super) type Point = (usize, Hertz, Complex<f64>);
 
@@ -47,9 +44,6 @@ pub(super) fn read_table(text: &str) -> Result<Vec<Point>, MeasurementError> {
             wanted: "a frequency, a gain in dB and a phase in degrees".to_owned(),
             found: line.to_owned(),
         })?);
-        if points.len() > MOST_POINTS {
-            return Err(MeasurementError::TooMany { most: MOST_POINTS });
-        }
     }
     Ok(points)
 }

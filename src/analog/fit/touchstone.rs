@@ -3,41 +3,26 @@
 //! Source: *Touchstone File Format Specification*, version 1.1, EIA/IBIS Open Forum.
 
 use super::MeasurementError;
-use super::text::{MOST_POINTS, Point, hertz, numbers, of_decibels, point};
+use super::text::{Point, hertz, numbers, of_decibels, point};
 use crate::linalg::Complex;
 use crate::messages::Quoted;
-
-/// How a pair of numbers is a complex one.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Pairs {
-    /// Magnitude and degrees.
-    MagnitudeAngle,
-    /// Decibels and degrees.
-    DecibelAngle,
-    RealImaginary,
-}
-
-impl Pairs {
-    fn value(self, a: f64, b: f64) -> Complex<f64> {
-        match self {
-            Self::MagnitudeAngle => Complex::from_polar(a, b.to_radians()),
-            Self::DecibelAngle => of_decibels(a, b),
-            Self::RealImaginary => Complex::new(a, b),
-        }
-    }
-}
 
 /// The option line.
 #[derive(Debug, Clone, Copy)]
 struct Options {
     hertz: f64,
-    pairs: Pairs,
+    /// The complex number of a pair.
+    value: fn(f64, f64) -> Complex<f64>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { hertz: 1e9, pairs: Pairs::MagnitudeAngle }
+        Self { hertz: 1e9, value: of_magnitude }
     }
+}
+
+fn of_magnitude(gain: f64, degrees: f64) -> Complex<f64> {
+    Complex::from_polar(gain, degrees.to_radians())
 }
 
 /// The points of one parameter, with their lines.
@@ -62,7 +47,7 @@ pub(super) fn read(
                     break;
                 }
                 let point = row.and_then(|row| network.point(line, &row));
-                network.add(point.ok_or_else(|| network.malformed(line, whole))?)?;
+                network.points.push(point.ok_or_else(|| network.malformed(line, whole))?);
             }
         }
     }
@@ -108,22 +93,14 @@ impl Network {
         if row.len() != self.width() {
             return None;
         }
-        let pairs = self.options.unwrap_or_default().pairs;
-        let value = pairs.value(row[1 + 2 * self.column], row[2 + 2 * self.column]);
-        point(line, self.frequency(row), value)
+        let Options { value, .. } = self.options.unwrap_or_default();
+        let pair = 1 + 2 * self.column;
+        point(line, self.frequency(row), value(row[pair], row[pair + 1]))
     }
 
     fn malformed(&self, line: usize, found: &str) -> MeasurementError {
         let wanted = format!("a frequency and {} numbers", self.width() - 1);
         MeasurementError::Line { line, wanted, found: found.to_owned() }
-    }
-
-    fn add(&mut self, point: Point) -> Result<(), MeasurementError> {
-        self.points.push(point);
-        if self.points.len() > MOST_POINTS {
-            return Err(MeasurementError::TooMany { most: MOST_POINTS });
-        }
-        Ok(())
     }
 }
 
@@ -147,9 +124,9 @@ fn option_line(line: usize, words: &str) -> Result<Options, MeasurementError> {
         }
         match word.to_ascii_uppercase().as_str() {
             "S" => {}
-            "MA" => options.pairs = Pairs::MagnitudeAngle,
-            "DB" => options.pairs = Pairs::DecibelAngle,
-            "RI" => options.pairs = Pairs::RealImaginary,
+            "MA" => options.value = of_magnitude,
+            "DB" => options.value = of_decibels,
+            "RI" => options.value = Complex::new,
             // The resistance does not matter: a ratio of waves is the gain between matched ports.
             "R" => drop(words.next()),
             "Y" | "Z" | "G" | "H" => {

@@ -3,7 +3,7 @@ use crate::calibrate::testbench::gaussian;
 use crate::random::Random;
 
 /// The line of two whole recordings.
-fn found(reference: &[f64], other: &[f64]) -> Result<LagLine, NoLag> {
+fn found(reference: &[f64], other: &[f64]) -> Result<LagLine, Vec<i64>> {
     let [reference, other] = [reference, other].map(|samples| Record::new(samples.to_vec()));
     line(&reference, &other, f64::INFINITY)
 }
@@ -35,7 +35,7 @@ fn recordings_without_anything_in_common_have_no_lag() {
     let mut dice = Random(72);
     for count in [1024, 5000, 200_000] {
         let [a, b] = [(); 2].map(|()| noise(count, &mut dice));
-        assert_eq!(found(&a, &b), Err(NoLag::NothingInCommon), "{count}");
+        assert_eq!(found(&a, &b), Err(Vec::new()), "{count}");
     }
 }
 
@@ -45,10 +45,10 @@ fn what_repeats_has_many_lags() {
         (0..count).map(|k| (0.7 * (k as f64 + early)).sin()).collect()
     };
     let alike = found(&tone(200_000, 0.0), &tone(200_000, 70.3)).unwrap_err();
-    assert!(matches!(&alike, NoLag::Ambiguous(lags) if lags.len() > 1), "{alike:?}");
+    assert!(alike.len() > 1, "{alike:?}");
     let mut dice = Random(73);
     let once = noise(9_000, &mut dice);
     let again: Vec<f64> = once.iter().cycle().take(150_000).copied().collect();
     let alike = found(&again, &again[4_000..]).unwrap_err();
-    assert!(matches!(&alike, NoLag::Ambiguous(lags) if lags.len() > 1), "{alike:?}");
+    assert!(alike.len() > 1, "{alike:?}");
 }

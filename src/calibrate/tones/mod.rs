@@ -34,7 +34,6 @@ use ambiguity::{Alias, zone_of};
 use interference::{is_harmonic, repeating_variances, widen_repeating};
 use phasors::{Captures, Measured};
 use solution::{CUTOFF_TONES, distinct, explained, outlying, solve};
-use std::borrow::Cow;
 
 /// Most tones that are looked for, and how far below the largest.
 const MOST_TONES: usize = 16;
@@ -59,12 +58,7 @@ pub(super) fn fit(
     // Of converters of one rate it is the same model.
     let of_frames = if layout.is_plain() { model.clone() } else { Model::new(&spec.per_sample())? };
     let measure = |one: &Acquisition<'_>| {
-        let split = || {
-            let records = one.records.iter().zip(layout.samples());
-            records.flat_map(|(one, &samples)| one.of_frames(samples)).collect()
-        };
-        let records = if layout.is_plain() { Cow::Borrowed(one.records) } else { Cow::Owned(split()) };
-        let captures = Captures::new(&records, &layout);
+        let captures = Captures::new(one.records, &layout);
         let held = held(model, &captures, given, acquisitions.len() > 1)?;
         Tones::measure(model, &of_frames, &captures, &held, settings.reference)
     };

@@ -158,11 +158,7 @@ impl<'a> Quantiser<'a> {
     /// The most fraction bits, within their limits, with which each rounded tap fits its bits. Taps that are
     /// zero at every scale, because of their bits, do not count.
     pub(super) fn finest_that_fits(&self, bits: &WordLengths) -> i32 {
-        self.finest_that_holds(self.error.problem.taps, bits)
-    }
-
-    /// [`Self::finest_that_fits`] for other taps.
-    fn finest_that_holds(&self, taps: &[Vec<f64>], bits: &WordLengths) -> i32 {
+        let taps = self.error.problem.taps;
         let spans = taps.iter().flat_map(|filter| {
             filter
                 .iter()

@@ -2,8 +2,7 @@
 
 use super::descent::Descent;
 use super::lattice::{Span, closest};
-use super::problem::Tap;
-use super::problem::{Candidate, TapError};
+use super::problem::{Candidate, Tap, TapError};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::design::filters::polyphase;

@@ -282,11 +282,8 @@ fn nodes(errors: &ErrorBox, centre: &ErrorPoint, offsets: &[f64]) -> Vec<Node> {
         let delays = side(centre.delays[channel].0, errors.delays[channel].0, offsets);
         let cutoffs = side(centre.cutoffs[channel], errors.cutoffs[channel], offsets);
         let node = |delay: f64, cutoff: f64| Node { channel, delay: FastPeriods(delay), cutoff };
-        let all: Vec<Node> = delays
-            .into_iter()
-            .flat_map(|delay| cutoffs.iter().map(move |&cutoff| node(delay, cutoff)))
-            .collect();
-        all
+        let all = |delay| cutoffs.iter().map(move |&cutoff| node(delay, cutoff));
+        delays.into_iter().flat_map(all).collect::<Vec<Node>>()
     };
     (0..errors.delays.len()).flat_map(of_channel).collect()
 }

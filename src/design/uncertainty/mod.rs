@@ -20,4 +20,5 @@ mod tests;
 mod widths;
 
 pub use study::BoxStudy;
-pub use widths::{BoxRule, BoxWidths, ReferenceChannel, RefusedBox};
+pub(crate) use widths::of;
+pub use widths::{BoxRule, BoxWidths, ReferenceChannel, Refused, RefusedBox};

@@ -61,15 +61,18 @@ impl FromStr for ReferenceChannel {
     }
 }
 
-/// A box that is refused.
+/// A setting that is refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{rule}")]
-pub struct RefusedBox {
-    /// The field of [`BoxWidths`].
+pub struct Refused<R> {
+    /// Its field.
     pub field: &'static str,
     /// Why.
-    pub rule: BoxRule,
+    pub rule: R,
 }
+
+/// A field of [`BoxWidths`] that is refused.
+pub type RefusedBox = Refused<BoxRule>;
 
 /// A rule for boxes of errors.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -104,8 +107,8 @@ impl From<SpecProblem> for BoxRule {
 }
 
 /// Names the field of a refusal.
-fn of<T>(field: &'static str, result: Result<T, impl Into<BoxRule>>) -> Result<T, RefusedBox> {
-    result.map_err(|rule| RefusedBox { field, rule: rule.into() })
+pub(crate) fn of<T, R>(field: &'static str, result: Result<T, impl Into<R>>) -> Result<T, Refused<R>> {
+    result.map_err(|rule| Refused { field, rule: rule.into() })
 }
 
 impl BoxWidths {

@@ -4,8 +4,7 @@
 
 use super::netlist::{Netlist, Term, Word, constant, wrapped};
 use super::output::Output;
-use crate::interchange::bit_true::IntegerFilters;
-use crate::interchange::bit_true::Range;
+use crate::interchange::bit_true::{IntegerFilters, Range};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 

@@ -4,8 +4,7 @@
 
 use super::netlist::{Netlist, Term, Word, wrapped};
 use super::output::{Output, held_sum};
-use crate::interchange::bit_true::IntegerFilters;
-use crate::interchange::bit_true::Range;
+use crate::interchange::bit_true::{IntegerFilters, Range};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 

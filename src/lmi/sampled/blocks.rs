@@ -30,7 +30,6 @@ pub(super) struct Cone<'a> {
     small: Blocks,
     wide: Blocks,
     full: Blocks,
-    other: Blocks,
     is_due: IsDue<'a>,
 }
 
@@ -57,7 +56,6 @@ impl<'a> Cone<'a> {
             small: Blocks::zeros(1, m, m),
             wide: Blocks::zeros(1, m, order),
             full: Blocks::zeros(1, order, order),
-            other: Blocks::zeros(1, order, order),
             is_due,
         }
     }
@@ -150,39 +148,31 @@ impl<'a> Cone<'a> {
         self.inner_slack(&self.z)
     }
 
-    /// `out = -Z - sym(X dS Z) + sigma_mu X - corrector`, the HKM dual step.
-    pub(super) fn dual_step(
-        &mut self,
-        step: &SlackStep,
-        sigma_mu: f64,
-        corrector: Option<&Blocks>,
-        out: &mut Blocks,
-    ) {
-        for l in self.points() {
-            fill_slack(&mut self.full, self.m, step, l);
-            self.other.block_mut(0).set_product(1.0, self.x.block(l).plain(), self.full.block(0).plain());
-            let mut block = out.block_mut(l);
-            block.set_product(-1.0, self.other.block(0).plain(), self.z.block(l).plain());
-            block.make_hermitian();
-            let (x, z) = (self.x.block(l).data, self.z.block(l).data);
-            for ((o, x), z) in block.data.iter_mut().zip(x).zip(z) {
-                *o += x * sigma_mu - z;
-            }
-            if let Some(c) = corrector {
-                block.data.iter_mut().zip(c.block(l).data).for_each(|(o, c)| *o -= c);
-            }
+    /// `-Z - sym(X dS Z) + sigma_mu X - corrector`, the HKM dual step.
+    pub(super) fn dual_step(&self, step: &SlackStep, sigma_mu: f64, corrector: Option<&Blocks>) -> Blocks {
+        let mut out = self.corrector(step, &self.z);
+        for ((o, x), z) in out.as_mut_slice().iter_mut().zip(self.x.as_slice()).zip(self.z.as_slice()) {
+            *o = x * sigma_mu - z - *o;
         }
+        if let Some(c) = corrector {
+            out.add_scaled(-1.0, c);
+        }
+        out
     }
 
-    /// `out = sym(X dS dZ)`, the second-order term of the predictor.
-    pub(super) fn corrector(&mut self, step: &SlackStep, dz: &Blocks, out: &mut Blocks) {
+    /// `sym(X dS Y)`, with dZ for Y the second-order term of the predictor.
+    pub(super) fn corrector(&self, step: &SlackStep, y: &Blocks) -> Blocks {
+        let order = self.m + self.k1;
+        let [mut slack, mut product] = [(); 2].map(|()| Blocks::zeros(1, order, order));
+        let mut out = Blocks::zeros(self.count(), order, order);
         for l in self.points() {
-            fill_slack(&mut self.full, self.m, step, l);
-            self.other.block_mut(0).set_product(1.0, self.x.block(l).plain(), self.full.block(0).plain());
+            fill_slack(&mut slack, self.m, step, l);
+            product.block_mut(0).set_product(1.0, self.x.block(l).plain(), slack.block(0).plain());
             let mut block = out.block_mut(l);
-            block.set_product(1.0, self.other.block(0).plain(), dz.block(l).plain());
+            block.set_product(1.0, product.block(0).plain(), y.block(l).plain());
             block.make_hermitian();
         }
+        out
     }
 
     /// Largest step, up to `most`, for which all slacks stay positive definite (to a part in 2^8).

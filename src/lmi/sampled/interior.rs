@@ -13,7 +13,6 @@ use crate::linalg::blocks::Blocks;
 use crate::lmi::IsDue;
 use crate::lmi::factor::RegularisedCholesky;
 use crate::lmi::iteration::{self, StepLengths, centering};
-use std::cell::OnceCell;
 
 /// The objective.
 #[derive(Debug, Clone)]
@@ -28,7 +27,7 @@ pub(super) enum Objective {
 /// from the boundary.
 const STARTING_GAP: f64 = 0.1;
 
-/// The iterate and its work memory.
+/// The iterate.
 pub(super) struct Engine<'a> {
     reduced: &'a Reduced,
     objective: Objective,
@@ -36,22 +35,7 @@ pub(super) struct Engine<'a> {
     pub(super) x: Vec<f64>,
     pub(super) cone: Cone<'a>,
     curvature: Option<Mat>,
-    projected_x: ChannelProjection,
-    projected_z: ChannelProjection,
-    dz: Blocks,
-    corrector: Blocks,
-    /// At the present iterate, once it is known.
-    equality: OnceCell<Equality>,
     is_due: IsDue<'a>,
-}
-
-/// The dual equality.
-#[derive(Debug)]
-struct Equality {
-    /// c.
-    cost: Vec<f64>,
-    /// `c - A*(Z)`.
-    residual: Vec<f64>,
 }
 
 /// A direction: taps, slack and dual matrices.
@@ -69,8 +53,6 @@ impl<'a> Engine<'a> {
         t: f64,
         is_due: IsDue<'a>,
     ) -> Option<Self> {
-        let (count, m, k1) = (reduced.count(), reduced.layout.rows, reduced.h.cols());
-        let (n, order) = (reduced.layout.channels, m + k1);
         let mut cone = Cone::new(t, reduced.error(&x), reduced.g.clone(), is_due);
         if !cone.invert() {
             return None;
@@ -83,19 +65,7 @@ impl<'a> Engine<'a> {
             }
         };
         cone.center(start);
-        Some(Self {
-            reduced,
-            objective,
-            x,
-            cone,
-            curvature,
-            projected_x: ChannelProjection::new(count, m, n, k1),
-            projected_z: ChannelProjection::new(count, m, n, k1),
-            dz: Blocks::zeros(count, order, order),
-            corrector: Blocks::zeros(count, order, order),
-            equality: OnceCell::new(),
-            is_due,
-        })
+        Some(Self { reduced, objective, x, cone, curvature, is_due })
     }
 
     fn free_t(&self) -> bool {
@@ -139,36 +109,22 @@ impl<'a> Engine<'a> {
     }
 
     /// `c - A*(Z)`.
-    pub(super) fn dual_residual(&self) -> &[f64] {
-        &self.equality().residual
+    pub(super) fn dual_residual(&self) -> Vec<f64> {
+        self.cost().iter().zip(self.adjoint(&self.cone.z)).map(|(c, a)| c - a).collect()
     }
 
-    fn equality(&self) -> &Equality {
-        self.equality.get_or_init(|| {
-            let cost = self.cost();
-            let residual = cost.iter().zip(self.adjoint(&self.cone.z)).map(|(c, a)| c - a).collect();
-            Equality { cost, residual }
-        })
-    }
-
-    fn newton(&mut self) -> Option<RegularisedCholesky> {
+    fn newton(&self) -> Option<RegularisedCholesky> {
+        let Reduced { h, layout, phases, .. } = self.reduced;
         let taps = self.x.len();
         let order = taps + usize::from(self.free_t());
         let mut matrix = match &self.curvature {
             Some(q) => q.clone(),
             None => Mat::zeros(order, order),
         };
-        self.projected_x.project(&self.cone.x, &self.reduced.h);
-        self.projected_z.project(&self.cone.z, &self.reduced.h);
-        newton::add_taps(
-            &mut matrix,
-            &self.reduced.layout,
-            &self.reduced.phases,
-            &self.projected_x,
-            &self.projected_z,
-        );
+        let [x, z] = [&self.cone.x, &self.cone.z].map(|blocks| ChannelProjection::new(blocks, h));
+        newton::add_taps(&mut matrix, layout, phases, &x, &z);
         if self.free_t() {
-            let (row, corner) = newton::border(self.reduced, &self.projected_x, &self.projected_z);
+            let (row, corner) = newton::border(self.reduced, &x, &z);
             row.iter().enumerate().for_each(|(a, v)| matrix[(taps, a)] = *v);
             matrix[(taps, taps)] = corner;
         }
@@ -192,29 +148,24 @@ impl<'a> Engine<'a> {
         let gap = self.cone.gap();
         let mu = gap / self.cone.order() as f64;
         let newton = self.newton().filter(|_| !(self.is_due)())?;
-        let cost = self.equality().cost.clone();
-        let mut dz = std::mem::replace(&mut self.dz, Blocks::zeros(0, 0, 0));
-        let mut corrector = std::mem::replace(&mut self.corrector, Blocks::zeros(0, 0, 0));
+        let cost = self.cost();
 
         let minus_cost: Vec<f64> = cost.iter().map(|c| -c).collect();
         let affine = self.direction(&newton, &minus_cost);
-        self.cone.dual_step(&affine.slack, 0.0, None, &mut dz);
+        let dz = self.cone.dual_step(&affine.slack, 0.0, None);
         let predicted = self.max_steps(&affine, &dz, 1.0);
         let sigma = centering(self.gap_after(gap, &affine, &dz, predicted) / gap);
 
-        self.cone.corrector(&affine.slack, &dz, &mut corrector);
+        let corrector = self.cone.corrector(&affine.slack, &dz);
         let (center, second) = (self.adjoint(&self.cone.x), self.adjoint(&corrector));
         let rhs: Vec<f64> = (0..cost.len()).map(|a| sigma * mu * center[a] - second[a] - cost[a]).collect();
         let full = self.direction(&newton, &rhs);
-        self.cone.dual_step(&full.slack, sigma * mu, Some(&corrector), &mut dz);
+        let dz = self.cone.dual_step(&full.slack, sigma * mu, Some(&corrector));
         let fraction = iteration::fraction(predicted);
         let StepLengths { primal, dual } = self.max_steps(&full, &dz, 1.0 / fraction);
         let length = StepLengths { primal: fraction * primal, dual: fraction * dual };
 
-        let done = if (self.is_due)() { None } else { self.advance(&full, &dz, length) };
-        self.dz = dz;
-        self.corrector = corrector;
-        done
+        if (self.is_due)() { None } else { self.advance(&full, &dz, length) }
     }
 
     /// Step lengths to the boundary. With a quadratic objective the dual residual moves with the taps, so
@@ -246,7 +197,6 @@ impl<'a> Engine<'a> {
         // From the unknowns, not from the step, so that rounding errors do not accumulate.
         self.cone.k = self.reduced.error(&self.x);
         self.cone.z.add_scaled(length.dual, dz);
-        self.equality = OnceCell::new();
         Some(())
     }
 }

@@ -162,7 +162,7 @@ impl Run<'_> {
     /// objective, whether or not the dual equality holds.
     fn duality_gap(&self) -> f64 {
         let r = self.engine.dual_residual();
-        let correction: f64 = self.curvature.solve(r).iter().zip(r).map(|(a, b)| a * b).sum();
+        let correction: f64 = self.curvature.solve(&r).iter().zip(&r).map(|(a, b)| a * b).sum();
         self.engine.cone.gap() + 0.5 * correction.max(0.0)
     }
 }

@@ -19,29 +19,22 @@ pub(super) struct ChannelProjection {
     pub(super) uu: Blocks,
     pub(super) vu: Blocks,
     pub(super) vv: Blocks,
-    half: Blocks,
 }
 
 impl ChannelProjection {
-    pub(super) fn new(count: usize, m: usize, n: usize, k: usize) -> Self {
-        Self {
-            uu: Blocks::zeros(count, m, m),
-            vu: Blocks::zeros(count, n, m),
-            vv: Blocks::zeros(count, n, n),
-            half: Blocks::zeros(1, n, k),
-        }
-    }
-
     /// Projects the blocks `x` of order m + k through the channels `h` (n x k).
-    pub(super) fn project(&mut self, x: &Blocks, h: &Blocks) {
-        let (m, k) = (self.uu.rows(), h.cols());
-        for l in 0..x.count() {
+    pub(super) fn new(x: &Blocks, h: &Blocks) -> Self {
+        let (count, n, k, m) = (x.count(), h.rows(), h.cols(), x.rows() - h.cols());
+        let (mut uu, mut vu) = (Blocks::zeros(count, m, m), Blocks::zeros(count, n, m));
+        let (mut vv, mut half) = (Blocks::zeros(count, n, n), Blocks::zeros(1, n, k));
+        for l in 0..count {
             let (full, h) = (x.block(l), h.block(l));
-            copy(full.part(0, 0, m, m), self.uu.block_mut(l).data);
-            self.vu.block_mut(l).set_product(1.0, h.plain(), full.part(m, 0, k, m).plain());
-            self.half.block_mut(0).set_product(1.0, h.plain(), full.part(m, m, k, k).plain());
-            self.vv.block_mut(l).set_product(1.0, self.half.block(0).plain(), h.adjoint());
+            copy(full.part(0, 0, m, m), uu.block_mut(l).data);
+            vu.block_mut(l).set_product(1.0, h.plain(), full.part(m, 0, k, m).plain());
+            half.block_mut(0).set_product(1.0, h.plain(), full.part(m, m, k, k).plain());
+            vv.block_mut(l).set_product(1.0, half.block(0).plain(), h.adjoint());
         }
+        Self { uu, vu, vv }
     }
 }
 

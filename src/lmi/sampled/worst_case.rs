@@ -126,7 +126,7 @@ impl Iterate for Run<'_> {
     /// the dual matrices give is usually within the tolerance.
     fn gap(&mut self) -> f64 {
         let engine = &self.engine;
-        0.25 * (engine.cone.gap() / engine.cone.t + norm(engine.dual_residual()))
+        0.25 * (engine.cone.gap() / engine.cone.t + norm(&engine.dual_residual()))
     }
 
     /// From the computed norm of the taps of the iterate and the lower bound that its dual matrices give.
