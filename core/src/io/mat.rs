@@ -197,11 +197,7 @@ impl Variable {
     }
 
     /// The numbers of the first `count` parts, real and imaginary.
-    fn parts(
-        &self,
-        file: &mut (impl Read + Seek),
-        count: usize,
-    ) -> Result<Vec<Numbers>, String> {
+    fn parts(&self, file: &mut (impl Read + Seek), count: usize) -> Result<Vec<Numbers>, String> {
         let numbers = self.count().ok_or_else(|| format!("the shape {} is too large", self.shape_text()))?;
         self.element.open(file, |mut reader| {
             Self::read(reader, self.element)?;
@@ -211,11 +207,7 @@ impl Variable {
 
     /// All samples in the order of the file, little-endian in the format of the class. Stored numbers may
     /// have fewer bytes than their class, which changes none of them.
-    fn samples(
-        &self,
-        file: &mut (impl Read + Seek),
-        format: PcmFormat,
-    ) -> Result<Vec<u8>, String> {
+    fn samples(&self, file: &mut (impl Read + Seek), format: PcmFormat) -> Result<Vec<u8>, String> {
         let parts = self.parts(file, 1 + usize::from(self.is_complex))?;
         let count = self.count().unwrap_or(0);
         let bytes = count.saturating_mul((parts.len() * format.bytes()) as u64);
@@ -227,9 +219,14 @@ impl Variable {
         memory.map_err(|_| {
             format!("its samples take {bytes} bytes of memory, more than there is; save a part of it")
         })?;
+        // Integers are codes, which the format divides by its full scale.
+        let full_scale = if format.is_float() { 1.0 } else { 2f64.powi(8 * format.bytes() as i32 - 1) };
+        let middle = if format == PcmFormat::U8 { full_scale } else { 0.0 };
+        let mut sample = vec![0; format.bytes()];
         for k in 0..count as usize {
             for numbers in &parts {
-                put(format, numbers.get(k).unwrap_or(f64::NAN), &mut samples);
+                format.encode((numbers.get(k).unwrap_or(f64::NAN) - middle) / full_scale, &mut sample);
+                samples.extend(&sample);
             }
         }
         Ok(samples)
@@ -287,18 +284,6 @@ impl Variable {
 
     fn shape_text(&self) -> String {
         Quoted(self.shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x ")).to_string()
-    }
-}
-
-/// Appends a number of the class.
-fn put(format: PcmFormat, number: f64, bytes: &mut Vec<u8>) {
-    match format {
-        PcmFormat::F64Le => bytes.extend(number.to_le_bytes()),
-        PcmFormat::F32Le => bytes.extend((number as f32).to_le_bytes()),
-        PcmFormat::S32Le => bytes.extend((number as i32).to_le_bytes()),
-        PcmFormat::S16Le => bytes.extend((number as i16).to_le_bytes()),
-        PcmFormat::U8 => bytes.push(number as u8),
-        _ => bytes.extend((number as i8).to_le_bytes()),
     }
 }
 
