@@ -31,17 +31,17 @@ save("sparse", {"s": __import__("scipy.sparse", fromlist=["csc_array"]).csc_arra
 
 
 def element(kind, data):
-    return kind.to_bytes(4, "big") + len(data).to_bytes(4, "big") + data + bytes(-len(data) % 8)
+    return kind.to_bytes(4, "little") + len(data).to_bytes(4, "little") + data + bytes(-len(data) % 8)
 
 
-# In the other byte order, which SciPy does not write; numbers of class double that are stored as int16, as MATLAB
-# does where it loses nothing. SciPy reads it back.
+# Numbers of class double that are stored as int16, as MATLAB does where it loses nothing; SciPy does not write
+# them. It reads them back.
 parts = [
-    element(6, (6).to_bytes(4, "big") + bytes(4)),
-    element(5, (40).to_bytes(4, "big") + (2).to_bytes(4, "big")),
+    element(6, (6).to_bytes(4, "little") + bytes(4)),
+    element(5, (40).to_bytes(4, "little") + (2).to_bytes(4, "little")),
     element(1, b"x"),
-    element(3, (8 * x).astype(">i2").tobytes()),
+    element(3, (8 * x).astype("<i2").tobytes()),
 ]
-header = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x01\x00MI"
-(FOLDER / "big.mat").write_bytes(header + element(14, b"".join(parts)))
-assert (scipy.io.loadmat(FOLDER / "big.mat")["x"] == 8 * x.T).all()
+header = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+(FOLDER / "stored.mat").write_bytes(header + element(14, b"".join(parts)))
+assert (scipy.io.loadmat(FOLDER / "stored.mat")["x"] == 8 * x.T).all()

@@ -191,33 +191,29 @@ fn worst_case_text(study: &BoxStudy) -> String {
 
 /// The box, a value per channel for each kind of error.
 fn of_box(errors: &ErrorBox<Seconds>) -> String {
-    let kinds = kinds(errors, &errors.delays, &errors.gains, &errors.cutoffs);
+    let kinds = kinds(errors, errors);
     let parts: Vec<String> = kinds.map(|(what, values)| format!("{what} ±({values})")).collect();
     if parts.is_empty() { "no errors".to_owned() } else { parts.join(", ") }
 }
 
 /// The worst point of a box.
 fn of_point(point: &ErrorPoint<Seconds>, errors: &ErrorBox<Seconds>) -> String {
-    let ErrorPoint { delays, gains, cutoffs } = point;
-    let parts: Vec<String> = kinds(errors, delays, gains, cutoffs)
-        .map(|(what, values)| format!("{what} off by {values}"))
-        .collect();
+    let parts: Vec<String> =
+        kinds(errors, point).map(|(what, values)| format!("{what} off by {values}")).collect();
     if parts.is_empty() { "without errors".to_owned() } else { parts.join(", ") }
 }
 
 /// Values of the kinds of errors that a box has, with their names.
 fn kinds(
     errors: &ErrorBox<Seconds>,
-    delays: &[Seconds],
-    gains: &[f64],
-    cutoffs: &[f64],
+    values: &ErrorPoint<Seconds>,
 ) -> impl Iterator<Item = (&'static str, String)> {
     let any = |shares: &[f64]| shares.iter().any(|x| *x > 0.0);
     let delays_differ = errors.delays.iter().any(|x| x.0 > 0.0);
     let all = [
-        delays_differ.then(|| ("delays", list(delays, |x| time(x.0)))),
-        any(&errors.gains).then(|| ("gains", list(gains, |x| percent(*x)))),
-        any(&errors.cutoffs).then(|| ("cut-offs", list(cutoffs, |x| percent(*x)))),
+        delays_differ.then(|| ("delays", list(&values.delays, |x| time(x.0)))),
+        any(&errors.gains).then(|| ("gains", list(&values.gains, |x| percent(*x)))),
+        any(&errors.cutoffs).then(|| ("cut-offs", list(&values.cutoffs, |x| percent(*x)))),
     ];
     all.into_iter().flatten()
 }

@@ -102,12 +102,6 @@ pub(super) fn say_line(line: &str) {
     PROGRAM.say_line(line);
 }
 
-/// One JSON object on standard error.
-pub(super) fn say_json(report: &impl serde::Serialize) -> Result<(), Failure> {
-    put(&(serde_json::to_string(report).map_err(failed)? + "\n"));
-    Ok(())
-}
-
 /// A warning on standard error.
 pub(super) fn warn(warning: &str) {
     PROGRAM.warn(warning);
@@ -220,7 +214,8 @@ pub(super) fn print_report(report: &impl serde::Serialize, samples: &Path) -> Re
     if !is_dash(samples) {
         return print_json(report);
     }
-    say_json(report)
+    put(&(serde_json::to_string(report).map_err(failed)? + "\n"));
+    Ok(())
 }
 
 #[cfg(all(test, unix))]

@@ -2,8 +2,8 @@
 
 use super::print::{Failure, failed, failed_at, is_dash, print_bytes};
 use hybank::files::{self, AtomicFile, FileError, commit_all, refuse_overlaps};
-use hybank::io::{Container, OutputHeader, PcmFormat, SampleWriter, is_pipe, is_sigmf};
-use std::io::{BufWriter, Write};
+use hybank::io::{Container, OutputHeader, PcmFormat, SampleWriter};
+use std::io::Write;
 use std::path::Path;
 
 /// Refuses outputs that are also inputs or other outputs.
@@ -107,27 +107,7 @@ impl<'a> Mono<'a> {
         Self { samples, imaginary: None, rate, format: PcmFormat::F32Le, container: Container::Wav }
     }
 
-    /// The header of an ordinary WAV file, if the recording at `path` is to be one: sizes and bytes per
-    /// second are numbers of 32 bits there.
-    fn ordinary_wav(&self, path: &Path) -> Option<hound::WavSpec> {
-        let bytes = self.format.bytes() as u64;
-        let is_small = |bytes: u64| bytes < u64::from(u32::MAX - 1024);
-        let sample_rate = self.rate.round() as u32;
-        let is_ordinary = self.container == Container::Wav
-            && self.imaginary.is_none()
-            && !is_sigmf(path)
-            && !is_pipe(path)
-            && bytes <= 4
-            && sample_rate > 0
-            && is_small(bytes * u64::from(sample_rate))
-            && is_small(bytes * self.samples.len() as u64);
-        let is_float = self.format.is_float();
-        let sample_format = if is_float { hound::SampleFormat::Float } else { hound::SampleFormat::Int };
-        let bits_per_sample = 8 * bytes as u16;
-        is_ordinary.then_some(hound::WavSpec { channels: 1, sample_rate, bits_per_sample, sample_format })
-    }
-
-    /// Any other recording.
+    /// Writes its files, which have no names yet.
     fn write(&self, path: &Path, force: bool) -> Result<Vec<AtomicFile>, Failure> {
         let Self { container, format, rate, imaginary, .. } = *self;
         let header = OutputHeader { container, format, is_complex: imaginary.is_some(), rate };
@@ -155,29 +135,8 @@ pub(super) fn write_recordings(files: &[(&Path, Mono<'_>)], force: bool) -> Resu
 
 /// The files of a recording, which are whole but have no names yet: two of a SigMF recording.
 pub(super) fn begin_recording(path: &Path, mono: Mono<'_>, force: bool) -> Result<Vec<AtomicFile>, Failure> {
-    let mut files = match mono.ordinary_wav(path) {
-        Some(spec) => {
-            let mut file = AtomicFile::create(path, force).map_err(failed)?;
-            write_wav(&mut file, mono.samples, spec)
-                .map_err(|error| failed_at(path, format!("cannot write it: {error}")))?;
-            vec![file]
-        }
-        None => mono.write(path, force)?,
-    };
+    let mut files = mono.write(path, force)?;
     // One open file at a time, however many there are.
     files.iter_mut().try_for_each(AtomicFile::seal).map_err(failed)?;
     Ok(files)
-}
-
-fn write_wav(file: &mut AtomicFile, samples: &[f64], spec: hound::WavSpec) -> hound::Result<()> {
-    let mut writer = hound::WavWriter::new(BufWriter::new(file), spec)?;
-    let full_scale = 2f64.powi(i32::from(spec.bits_per_sample) - 1);
-    match spec.sample_format {
-        hound::SampleFormat::Float => samples.iter().try_for_each(|&x| writer.write_sample(x as f32))?,
-        // Steps of a converter that are whole steps of the file.
-        hound::SampleFormat::Int => {
-            samples.iter().try_for_each(|&x| writer.write_sample((x * full_scale) as i32))?;
-        }
-    }
-    writer.finalize()
 }

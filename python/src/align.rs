@@ -6,7 +6,7 @@ use crate::calibrate::reference_of;
 use crate::errors::{refused, warn};
 use crate::results::{Made, record};
 use crate::sources;
-use hybank::align::{self, AlignSettings, AlignedChannel, Alignment};
+use hybank::align::{self as alignment, AlignSettings, AlignedChannel, Alignment};
 use hybank::calibrate::Record;
 use hybank::figures::Alone;
 use hybank::units::Seconds;
@@ -31,10 +31,10 @@ pub(crate) fn align<'py>(
     let settings = AlignSettings {
         reference: reference_of(&spec, reference)?,
         within: within.map(Seconds),
-        rate_walk: align::RATE_WALK,
+        rate_walk: alignment::RATE_WALK,
     };
     let found = background::run(py, None, move |_| {
-        let found = align::align(&spec, &all, settings).map_err(|error| error.to_string())?;
+        let found = alignment::align(&spec, &all, settings).map_err(|error| error.to_string())?;
         let alone = Alone::new(&found.spec).map_err(|error| error.to_string())?;
         Ok::<_, String>((found, alone))
     })?;

@@ -92,13 +92,6 @@ pub(crate) struct Fused<'py> {
     number: PcmFormat,
 }
 
-/// Output samples of a run, and what it tells.
-struct Run<'py> {
-    y: Bound<'py, PyAny>,
-    outcome: Outcome,
-    latency_dropped: usize,
-}
-
 /// The output samples of an array.
 pub(crate) fn fuse<'py>(
     bank: &Bank,
@@ -110,21 +103,16 @@ pub(crate) fn fuse<'py>(
     let (py, begin) = (x.py(), Instant::now());
     let held = Held::new(x, shape)?;
     let format = Format::of_output(held.format, dtype)?;
-    let Run { y, outcome, latency_dropped } = filtered(bank, &held, format, request)?;
-    // A frame may hold several samples of a converter.
-    let outcome = Outcome { channels: bank.channel_count(), ..outcome };
-    let seconds = begin.elapsed().as_secs_f64();
-    let captures = match request.is_reported {
-        true => judged(bank, &held)?,
-        false => Verdict::Unjudged.into(),
-    };
-    let (frames, number) = (held.frames(), format.number);
-    let fused = Fused { y, outcome, captures, frames, latency_dropped, seconds, number };
+    let mut fused = filtered(bank, &held, format, request)?;
+    fused.seconds = begin.elapsed().as_secs_f64();
+    if request.is_reported {
+        fused.captures = judged(bank, &held)?;
+    }
     fused.warnings().iter().try_for_each(|text| warn(py, text))?;
     Ok(fused)
 }
 
-fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Request) -> PyResult<Run<'py>> {
+fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Request) -> PyResult<Fused<'py>> {
     let (py, settings, frames) = (held.py(), request.settings(), held.frames());
     let plan = plan(bank, format, request.algorithm, settings)?;
     let mut array = NewArray::new(py, frames * bank.ratio, format)?;
@@ -136,9 +124,16 @@ fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Reques
     let stop = || signals.raised();
     let outcome = py.detach(|| pipeline::fuse(bank, &plan, &parts, &mut room, settings, &stop));
     let outcome = outcome.map_err(|error| signals.into_error().unwrap_or_else(|| refused(error)))?;
-    let outcome = Outcome { clipped: room.clipped, ..outcome };
-    let (y, latency_dropped) = (array.finish()?, settings.dropped.samples(&plan));
-    Ok(Run { y, outcome, latency_dropped })
+    Ok(Fused {
+        // A frame may hold several samples of a converter.
+        outcome: Outcome { clipped: room.clipped, channels: bank.channel_count(), ..outcome },
+        y: array.finish()?,
+        captures: Verdict::Unjudged.into(),
+        frames,
+        latency_dropped: settings.dropped.samples(&plan),
+        seconds: 0.0,
+        number: format.number,
+    })
 }
 
 impl Fused<'_> {

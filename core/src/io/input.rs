@@ -8,8 +8,6 @@ use super::lost::LostInInput;
 use super::open::InputSource;
 use super::pipe::is_file;
 use super::stall::{PATIENCE, Wait};
-#[cfg(target_os = "linux")]
-use super::stdin_reader::read_stdin;
 use super::{InputFault, IoError, StreamHeader};
 use crossbeam_channel::{Receiver, Sender, bounded, select};
 use std::thread;
@@ -46,39 +44,15 @@ fn send_all(source: &InputSource, messages: &Sender<Result<Message, IoError>>, p
 pub(super) struct Input {
     pub(super) name: String,
     pub(super) grouped: GroupedInput,
-    source: Source,
+    /// From its thread, to which blocks go back by the pool.
+    messages: Receiver<Result<Message, IoError>>,
+    pool: Sender<Vec<u8>>,
     /// What it says besides its samples.
     pub(super) notes: InputNotes,
     faults: Vec<InputFault>,
 }
 
-/// The source of an input's frames.
-enum Source {
-    /// Its thread, to which blocks go back.
-    Thread { messages: Receiver<Result<Message, IoError>>, pool: Sender<Vec<u8>> },
-    /// Standard input itself, with a block to fill.
-    #[cfg(target_os = "linux")]
-    Stdin { frames: Box<InputFrames>, spare: Vec<u8> },
-}
-
 impl Input {
-    /// The only input.
-    #[cfg(target_os = "linux")]
-    pub(super) fn alone(source: InputSource) -> Result<Self, IoError> {
-        if !source.is_stdin() || source.coding.format().is_none() {
-            return Self::on_thread(source);
-        }
-        let frames = Box::new(InputFrames::open(&source)?);
-        let per_frame = source.per_frame;
-        Ok(Self::new(source.name(), frames.header, per_frame, Source::Stdin { frames, spare: Vec::new() }))
-    }
-
-    /// The only input.
-    #[cfg(not(target_os = "linux"))]
-    pub(super) fn alone(source: InputSource) -> Result<Self, IoError> {
-        Self::on_thread(source)
-    }
-
     pub(super) fn on_thread(source: InputSource) -> Result<Self, IoError> {
         // Until the header comes, the channels are those of the settings; they may not fit these.
         let settings = source.raw_header();
@@ -106,47 +80,32 @@ impl Input {
         thread
             .spawn(move || send_all(message_sender, pool_out))
             .map_err(IoError::system(&name, "start a thread that reads it"))?;
-        Ok(Self::new(name, header, per_frame, Source::Thread { messages, pool }))
-    }
-
-    fn new(name: String, header: StreamHeader, per_frame: usize, source: Source) -> Self {
-        Self {
+        Ok(Self {
             name,
             grouped: GroupedInput::new(AlignedInput::new(header), per_frame),
-            source,
+            messages,
+            pool,
             notes: InputNotes::default(),
             faults: Vec::new(),
-        }
+        })
     }
 
     /// Waits for the next message; false if a stop was asked for first.
     pub(super) fn receive(&mut self, stop: &Receiver<()>, mut wait: Wait<'_>) -> Result<bool, IoError> {
-        let message = match &mut self.source {
-            Source::Thread { messages, .. } => loop {
-                select! {
-                    // A reader that has come to the end of its input says so.
-                    recv(messages) -> message => match message {
-                        Ok(message) => break Some(message?),
-                        Err(_) => return Err(IoError::ReaderDied { file: self.name.clone() }),
-                    },
-                    recv(stop) -> _ => break None,
-                    default(PATIENCE) => wait.go_on(),
-                }
-            },
-            #[cfg(target_os = "linux")]
-            Source::Stdin { frames, spare } => read_stdin(frames, spare, stop, &mut wait)?,
+        let message = loop {
+            select! {
+                // A reader that has come to the end of its input says so.
+                recv(self.messages) -> message => match message {
+                    Ok(message) => break message?,
+                    Err(_) => return Err(IoError::ReaderDied { file: self.name.clone() }),
+                },
+                recv(stop) -> _ => return Ok(false),
+                default(PATIENCE) => wait.go_on(),
+            }
         };
-        let received = message.is_some();
-        if let Some(message) = message {
-            wait.end();
-            self.take(message);
-        }
-        Ok(received)
-    }
-
-    /// Whether the first message is the header.
-    pub(super) fn sends_header(&self) -> bool {
-        matches!(self.source, Source::Thread { .. })
+        wait.end();
+        self.take(message);
+        Ok(true)
     }
 
     fn take(&mut self, message: Message) {
@@ -175,14 +134,9 @@ impl Input {
     }
 
     fn give_back(&mut self, block: Block) {
-        if block.bytes.is_empty() {
-            return;
-        }
-        match &mut self.source {
+        if !block.bytes.is_empty() {
             // A thread that has ended needs no blocks.
-            Source::Thread { pool, .. } => drop(pool.send(block.bytes)),
-            #[cfg(target_os = "linux")]
-            Source::Stdin { spare, .. } => *spare = block.bytes,
+            let _ = self.pool.send(block.bytes);
         }
     }
 

@@ -5,7 +5,6 @@ use super::timestamps::{MAX_LOST_AT_ONCE, Timestamp, Timestamps};
 use crate::files::{Bound, read_text};
 use crate::messages::of_document;
 use serde::Deserialize;
-use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::Path;
 
@@ -16,7 +15,7 @@ const LOST_FILE: Bound = Bound {
     remedy: "give the file that was meant, or fuse the recording in parts",
 };
 
-/// Maximum number of lines of all inputs together, where a line for all channels counts once per input.
+/// Most lines of a file times the channels of all inputs.
 const MOST_LINES: usize = 1 << 24;
 
 /// Invalid samples of one channel, or of all.
@@ -162,37 +161,26 @@ impl LostSamples {
             return Err(self.fault(format!("channel {} is named, but there are {all}", channel + 1)));
         }
         let lines = self.lines.len();
-        if channels.len() > 1 && lines.saturating_mul(channels.len()) > MOST_LINES {
+        if lines.saturating_mul(all) > MOST_LINES {
             return Err(self.fault(format!(
-                "{lines} lines for {} inputs are more than {MOST_LINES} in all; fuse the recording in parts",
-                channels.len()
+                "{lines} lines for {all} channels are more than {MOST_LINES} in all; fuse the recording in parts"
             )));
         }
-        let named = self.named_channels();
         let mut first = 0;
         let of_input = |&count: &usize| {
             first += count;
-            self.of_input(first - count..first, &named)
+            self.of_input(first - count..first)
         };
         channels.iter().map(of_input).collect()
     }
 
-    /// The channels that a timestamp names.
-    fn named_channels(&self) -> BTreeSet<usize> {
-        let timestamps = self.lines.iter().filter(|line| matches!(line.entry, Entry::Timestamp(_)));
-        timestamps.filter_map(|line| line.channel).collect()
-    }
-
-    fn of_input(&self, channels: Range<usize>, named: &BTreeSet<usize>) -> Result<LostInInput, IoError> {
+    fn of_input(&self, channels: Range<usize>) -> Result<LostInInput, IoError> {
         let timestamps = |wanted: usize| -> Vec<Timestamp> {
             let lines = self.lines.iter().filter(|line| line.channel.is_none_or(|channel| channel == wanted));
             lines.filter_map(|line| line.entry.timestamp()).collect()
         };
-        // Channels that no line names have the same timestamps, so one of them stands for all.
-        let unnamed = channels.clone().find(|channel| !named.contains(channel));
-        let distinct: BTreeSet<usize> = named.range(channels.clone()).copied().chain(unnamed).collect();
-        let mut given =
-            distinct.into_iter().map(|channel| (channel, timestamps(channel))).filter(|(_, a)| !a.is_empty());
+        let all = channels.clone().map(|channel| (channel, timestamps(channel)));
+        let mut given = all.filter(|(_, timestamps)| !timestamps.is_empty());
         let (channel, timestamps) = given.next().unwrap_or_default();
         if let Some((other, _)) = given.find(|(_, others)| *others != timestamps) {
             return Err(self.fault(format!(

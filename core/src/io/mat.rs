@@ -5,7 +5,7 @@
 //! it is the only array. A number called `fs` gives the rate.
 
 use super::array::{ArrayHeader, ArrayReader};
-use super::mat_element::{COMPRESSED, MATRIX, Numbers, Order, Tag, unreadable};
+use super::mat_element::{COMPRESSED, MATRIX, Numbers, Tag, unreadable};
 use super::{IoError, PcmFormat};
 use crate::files::fill;
 use crate::messages::Quoted;
@@ -63,18 +63,18 @@ pub fn open_mat(
     name: &str,
 ) -> Result<ArrayReader<Cursor<Vec<u8>>>, IoError> {
     let fault = || IoError::malformed(name, "a MATLAB file of samples");
-    let order = header(file).map_err(fault())?;
-    let all = variables(file, order).map_err(fault())?;
+    check_header(file).map_err(fault())?;
+    let all = variables(file).map_err(fault())?;
     let variable = chosen(&all, wanted, name).map_err(fault())?;
     let of_variable = |problem: String| fault()(format!("variable {}: {problem}", Quoted(&variable.name)));
     let array = variable.array().map_err(of_variable)?;
-    let samples = variable.samples(file, order, array.format).map_err(of_variable)?;
-    let rate = rate(file, order, &all).map_err(fault())?;
+    let samples = variable.samples(file, array.format).map_err(of_variable)?;
+    let rate = rate(file, &all).map_err(fault())?;
     ArrayReader::new(array, Cursor::new(samples), rate, of_variable)
 }
 
-/// The byte order, from the header of the file.
-fn header(file: &mut (impl Read + Seek)) -> Result<Order, String> {
+/// Refuses files of other versions, by their header.
+fn check_header(file: &mut (impl Read + Seek)) -> Result<(), String> {
     const REMEDY: &str =
         "save it in MATLAB with save(\"x.mat\", \"x\", \"-v7\") or in Python with scipy.io.savemat";
     let mut bytes = [0; HEADER];
@@ -88,25 +88,25 @@ fn header(file: &mut (impl Read + Seek)) -> Result<Order, String> {
     if filled < HEADER {
         return Err(format!("it has {filled} bytes, and the header alone has {HEADER}; {REMEDY}"));
     }
-    let (version, order) = match &bytes[126..] {
-        b"IM" => ([bytes[125], bytes[124]], Order::Little),
-        b"MI" => ([bytes[124], bytes[125]], Order::Big),
-        _ => return Err(format!("bytes 126 and 127 are not IM or MI as in version 5; {REMEDY}")),
-    };
-    if version == [1, 0] { Ok(order) } else { Err(format!("its version {version:?} is not 5; {REMEDY}")) }
+    match bytes[124..] {
+        [0, 1, b'I', b'M'] => Ok(()),
+        [.., b'M', b'I'] => Err(format!("its numbers are big-endian, which is not read; {REMEDY}")),
+        [low, high, b'I', b'M'] => Err(format!("its version {:?} is not 5; {REMEDY}", [high, low])),
+        _ => Err(format!("bytes 126 and 127 are not IM as in version 5; {REMEDY}")),
+    }
 }
 
 /// All variables in their order.
-fn variables(file: &mut (impl Read + Seek), order: Order) -> Result<Vec<Variable>, String> {
+fn variables(file: &mut (impl Read + Seek)) -> Result<Vec<Variable>, String> {
     let mut all = Vec::new();
     let mut offset = HEADER as u64;
     loop {
         file.seek(SeekFrom::Start(offset)).map_err(unreadable)?;
-        let Some(tag) = Tag::read(file, order).map_err(unreadable)? else { return Ok(all) };
+        let Some(tag) = Tag::read(file).map_err(unreadable)? else { return Ok(all) };
         offset += Tag::BYTES;
         let element = Element { offset, size: tag.size, is_compressed: tag.kind == COMPRESSED };
         if [MATRIX, COMPRESSED].contains(&tag.kind) {
-            let found = element.open(file, order, |reader| Variable::read(reader, order, element));
+            let found = element.open(file, |reader| Variable::read(reader, element));
             all.extend(found.map_err(|problem| format!("variable {}: {problem}", all.len() + 1))?);
         }
         offset += tag.after();
@@ -144,14 +144,14 @@ fn chosen<'a>(all: &'a [Variable], wanted: Option<&str>, file: &str) -> Result<&
 }
 
 /// The number called fs, if there is one greater than 0.
-fn rate(file: &mut (impl Read + Seek), order: Order, all: &[Variable]) -> Result<Option<f64>, String> {
+fn rate(file: &mut (impl Read + Seek), all: &[Variable]) -> Result<Option<f64>, String> {
     let is_rate = |variable: &&Variable| {
         let name = variable.name.to_ascii_lowercase();
         let is_number = variable.is_numeric() && variable.count() == Some(1);
         is_number && ["fs", "samplerate", "sample_rate"].contains(&name.as_str())
     };
     let Some(variable) = all.iter().find(is_rate) else { return Ok(None) };
-    let rate = variable.parts(file, order, 1)?.first().and_then(|numbers| numbers.get(0, order));
+    let rate = variable.parts(file, 1)?.first().and_then(|numbers| numbers.get(0));
     Ok(rate.filter(|rate| rate.is_finite() && *rate > 0.0))
 }
 
@@ -160,7 +160,6 @@ impl Element {
     fn open<T>(
         self,
         file: &mut (impl Read + Seek),
-        order: Order,
         read: impl FnOnce(&mut dyn Read) -> Result<T, String>,
     ) -> Result<T, String> {
         file.seek(SeekFrom::Start(self.offset)).map_err(unreadable)?;
@@ -169,7 +168,7 @@ impl Element {
             return read(&mut bytes);
         }
         let mut inflated = ZlibDecoder::new(bytes);
-        match Tag::read(&mut inflated, order).map_err(unreadable)? {
+        match Tag::read(&mut inflated).map_err(unreadable)? {
             Some(tag) if tag.kind == MATRIX => read(&mut inflated.take(tag.size)),
             _ => Err("it holds no variable; save it again".into()),
         }
@@ -178,14 +177,14 @@ impl Element {
 
 impl Variable {
     /// From its first elements; `None` for data of MATLAB's own that have no name.
-    fn read(mut reader: &mut dyn Read, order: Order, element: Element) -> Result<Option<Self>, String> {
+    fn read(mut reader: &mut dyn Read, element: Element) -> Result<Option<Self>, String> {
         let mut next = |what: &str| -> Result<Vec<u8>, String> {
-            let tag = Tag::read(&mut reader, order).map_err(unreadable)?;
+            let tag = Tag::read(&mut reader).map_err(unreadable)?;
             let tag = tag.ok_or_else(|| format!("its {what} is missing; copy it again"))?;
             tag.content(&mut reader, MOST_HEADER)
         };
         let words = |bytes: Vec<u8>| -> Vec<u32> {
-            let word = |bytes: &[u8]| bytes.try_into().map_or(0, |bytes| order.u32(bytes));
+            let word = |bytes: &[u8]| bytes.try_into().map_or(0, u32::from_le_bytes);
             bytes.chunks_exact(4).map(word).collect()
         };
         let flags = words(next("class")?).first().copied().ok_or("its class is missing; save it again")?;
@@ -198,28 +197,18 @@ impl Variable {
     }
 
     /// The numbers of the first `count` parts, real and imaginary.
-    fn parts(
-        &self,
-        file: &mut (impl Read + Seek),
-        order: Order,
-        count: usize,
-    ) -> Result<Vec<Numbers>, String> {
+    fn parts(&self, file: &mut (impl Read + Seek), count: usize) -> Result<Vec<Numbers>, String> {
         let numbers = self.count().ok_or_else(|| format!("the shape {} is too large", self.shape_text()))?;
-        self.element.open(file, order, |mut reader| {
-            Self::read(reader, order, self.element)?;
-            (0..count).map(|_| Numbers::read(&mut reader, order, numbers)).collect()
+        self.element.open(file, |mut reader| {
+            Self::read(reader, self.element)?;
+            (0..count).map(|_| Numbers::read(&mut reader, numbers)).collect()
         })
     }
 
     /// All samples in the order of the file, little-endian in the format of the class. Stored numbers may
     /// have fewer bytes than their class, which changes none of them.
-    fn samples(
-        &self,
-        file: &mut (impl Read + Seek),
-        order: Order,
-        format: PcmFormat,
-    ) -> Result<Vec<u8>, String> {
-        let parts = self.parts(file, order, 1 + usize::from(self.is_complex))?;
+    fn samples(&self, file: &mut (impl Read + Seek), format: PcmFormat) -> Result<Vec<u8>, String> {
+        let parts = self.parts(file, 1 + usize::from(self.is_complex))?;
         let count = self.count().unwrap_or(0);
         let bytes = count.saturating_mul((parts.len() * format.bytes()) as u64);
         if bytes > MOST_BYTES {
@@ -230,9 +219,14 @@ impl Variable {
         memory.map_err(|_| {
             format!("its samples take {bytes} bytes of memory, more than there is; save a part of it")
         })?;
+        // Integers are codes, which the format divides by its full scale.
+        let full_scale = if format.is_float() { 1.0 } else { 2f64.powi(8 * format.bytes() as i32 - 1) };
+        let middle = if format == PcmFormat::U8 { full_scale } else { 0.0 };
+        let mut sample = vec![0; format.bytes()];
         for k in 0..count as usize {
             for numbers in &parts {
-                put(format, numbers.get(k, order).unwrap_or(f64::NAN), &mut samples);
+                format.encode((numbers.get(k).unwrap_or(f64::NAN) - middle) / full_scale, &mut sample);
+                samples.extend(&sample);
             }
         }
         Ok(samples)
@@ -290,18 +284,6 @@ impl Variable {
 
     fn shape_text(&self) -> String {
         Quoted(self.shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x ")).to_string()
-    }
-}
-
-/// Appends a number of the class.
-fn put(format: PcmFormat, number: f64, bytes: &mut Vec<u8>) {
-    match format {
-        PcmFormat::F64Le => bytes.extend(number.to_le_bytes()),
-        PcmFormat::F32Le => bytes.extend((number as f32).to_le_bytes()),
-        PcmFormat::S32Le => bytes.extend((number as i32).to_le_bytes()),
-        PcmFormat::S16Le => bytes.extend((number as i16).to_le_bytes()),
-        PcmFormat::U8 => bytes.push(number as u8),
-        _ => bytes.extend((number as i8).to_le_bytes()),
     }
 }
 

@@ -6,31 +6,6 @@ use std::io::{self, Read};
 /// Most bytes of the numbers of an array, which are held in memory.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// Order of the bytes of a number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Order {
-    Little,
-    Big,
-}
-
-impl Order {
-    pub(super) fn u32(self, bytes: [u8; 4]) -> u32 {
-        match self {
-            Self::Little => u32::from_le_bytes(bytes),
-            Self::Big => u32::from_be_bytes(bytes),
-        }
-    }
-
-    /// The first `N` bytes, the least significant one first.
-    fn little<const N: usize>(self, bytes: &[u8]) -> Option<[u8; N]> {
-        let mut bytes: [u8; N] = bytes.get(..N)?.try_into().ok()?;
-        if self == Self::Big {
-            bytes.reverse();
-        }
-        Some(bytes)
-    }
-}
-
 /// Type and size of an element.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tag {
@@ -49,7 +24,7 @@ impl Tag {
     pub(super) const BYTES: u64 = 8;
 
     /// `None` at the end.
-    pub(super) fn read(reader: &mut impl Read, order: Order) -> io::Result<Option<Self>> {
+    pub(super) fn read(reader: &mut impl Read) -> io::Result<Option<Self>> {
         let mut bytes = [0; 8];
         match fill(reader, &mut bytes)? {
             0 => return Ok(None),
@@ -57,10 +32,10 @@ impl Tag {
             _ => return Err(io::ErrorKind::UnexpectedEof.into()),
         }
         let [a, b, c, d, e, f, g, h] = bytes;
-        let (first, second) = (order.u32([a, b, c, d]), [e, f, g, h]);
+        let (first, second) = (u32::from_le_bytes([a, b, c, d]), [e, f, g, h]);
         let small = u64::from(first >> 16);
         Ok(Some(match small {
-            0 => Self { kind: first, size: u64::from(order.u32(second)), small: None },
+            0 => Self { kind: first, size: u64::from(u32::from_le_bytes(second)), small: None },
             _ => Self { kind: first & 0xFFFF, size: small, small: Some(second) },
         }))
     }
@@ -110,8 +85,8 @@ pub(super) struct Numbers {
 
 impl Numbers {
     /// `count` numbers; they may have fewer bytes than their class.
-    pub(super) fn read(reader: &mut impl Read, order: Order, count: u64) -> Result<Self, String> {
-        let tag = Tag::read(reader, order).map_err(unreadable)?;
+    pub(super) fn read(reader: &mut impl Read, count: u64) -> Result<Self, String> {
+        let tag = Tag::read(reader).map_err(unreadable)?;
         let tag = tag.ok_or("its numbers are missing; copy it again")?;
         let size = Self::size(tag.kind)
             .ok_or_else(|| format!("numbers of type {}, which is unknown; save it again", tag.kind))?;
@@ -134,20 +109,25 @@ impl Numbers {
     }
 
     /// Number `index`.
-    pub(super) fn get(&self, index: usize, order: Order) -> Option<f64> {
+    pub(super) fn get(&self, index: usize) -> Option<f64> {
         let size = Self::size(self.kind)? as usize;
         let bytes = self.bytes.get(index.checked_mul(size)?..)?;
         Some(match self.kind {
-            1 => f64::from(i8::from_le_bytes(order.little(bytes)?)),
-            2 => f64::from(u8::from_le_bytes(order.little(bytes)?)),
-            3 => f64::from(i16::from_le_bytes(order.little(bytes)?)),
-            4 => f64::from(u16::from_le_bytes(order.little(bytes)?)),
-            5 => f64::from(i32::from_le_bytes(order.little(bytes)?)),
-            6 => f64::from(u32::from_le_bytes(order.little(bytes)?)),
-            7 => f64::from(f32::from_le_bytes(order.little(bytes)?)),
-            9 => f64::from_le_bytes(order.little(bytes)?),
-            12 => i64::from_le_bytes(order.little(bytes)?) as f64,
-            _ => u64::from_le_bytes(order.little(bytes)?) as f64,
+            1 => f64::from(i8::from_le_bytes(first(bytes)?)),
+            2 => f64::from(u8::from_le_bytes(first(bytes)?)),
+            3 => f64::from(i16::from_le_bytes(first(bytes)?)),
+            4 => f64::from(u16::from_le_bytes(first(bytes)?)),
+            5 => f64::from(i32::from_le_bytes(first(bytes)?)),
+            6 => f64::from(u32::from_le_bytes(first(bytes)?)),
+            7 => f64::from(f32::from_le_bytes(first(bytes)?)),
+            9 => f64::from_le_bytes(first(bytes)?),
+            12 => i64::from_le_bytes(first(bytes)?) as f64,
+            _ => u64::from_le_bytes(first(bytes)?) as f64,
         })
     }
+}
+
+/// The first `N` bytes.
+fn first<const N: usize>(bytes: &[u8]) -> Option<[u8; N]> {
+    bytes.first_chunk().copied()
 }

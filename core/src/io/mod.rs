@@ -52,8 +52,6 @@ mod sample_writer;
 mod sigmf;
 mod sigmf_reader;
 mod stall;
-#[cfg(target_os = "linux")]
-mod stdin_reader;
 mod stream_header;
 pub mod table;
 mod timestamps;

@@ -1,5 +1,5 @@
 //! Reads several inputs as their samples arrive, with one thread per input. The consumer gets a frame as
-//! soon as every input has its samples of it. If raw standard input is the only input, it needs no thread.
+//! soon as every input has its samples of it.
 //!
 //! Memory is bounded: each input has a pool of a few blocks that circulate between its thread and the
 //! consumer. If the consumer is slow, reading stops, and so do the writers of the pipes.
@@ -82,22 +82,14 @@ impl MultiReader {
             per_frame: options.samples_per_frame.get(i).copied().unwrap_or(1),
             block,
         };
-        let inputs = match paths {
-            [path] => vec![Input::alone(source((0, path)))?],
-            // All threads first: opening a FIFO waits for its writer, in whatever order they come.
-            _ => paths
-                .iter()
-                .enumerate()
-                .map(|input| Input::on_thread(source(input)))
-                .collect::<Result<_, _>>()?,
-        };
+        // All threads first: opening a FIFO waits for its writer, in whatever order they come.
+        let inputs = paths.iter().enumerate().map(|input| Input::on_thread(source(input)));
+        let inputs = inputs.collect::<Result<_, _>>()?;
         let ReadOptions { until, max_lost, lost, .. } = options;
         let stop = crossbeam_channel::never();
         let mut reader = Self { inputs, stop, until, max_lost, origin: 0, ready: 0, consumed: 0 };
         for i in 0..paths.len() {
-            if reader.inputs[i].sends_header() {
-                reader.receive(i, on_stall)?;
-            }
+            reader.receive(i, on_stall)?;
         }
         reader.refuse_some_complex()?;
         reader.align(lost)?;

@@ -54,31 +54,22 @@ impl<'a> Wait<'a> {
 
     /// Nothing has come yet.
     pub(super) fn go_on(&mut self) {
-        self.go_on_after(self.began.elapsed());
+        if !self.is_reported && self.began.elapsed() >= PATIENCE {
+            self.is_reported = true;
+            self.report();
+        }
     }
 
     /// Something has come.
-    pub(super) fn end(self) {
-        let waited = self.began.elapsed();
-        self.end_after(waited);
-    }
-
-    fn go_on_after(&mut self, waited: Duration) {
-        if !self.is_reported && waited >= PATIENCE {
-            self.is_reported = true;
-            self.report(waited);
-        }
-    }
-
-    fn end_after(mut self, waited: Duration) {
+    pub(super) fn end(mut self) {
         if self.is_reported {
             self.stall.is_over = true;
-            self.report(waited);
+            self.report();
         }
     }
 
-    fn report(&mut self, waited: Duration) {
-        self.stall.seconds = waited.as_millis() as f64 / 1e3;
+    fn report(&mut self) {
+        self.stall.seconds = self.began.elapsed().as_millis() as f64 / 1e3;
         (self.report)(&self.stall);
     }
 }
@@ -93,11 +84,16 @@ mod tests {
         let mut wait = |steps: u64, end: u64| {
             let mut report = |stall: &Stall| reported.push(stall.to_string());
             let mut wait = Wait::new(&mut report, "x", [2, 2]);
-            (1..=steps).for_each(|k| wait.go_on_after(Duration::from_millis(500 * k)));
-            wait.end_after(Duration::from_millis(end));
+            let ago = |milliseconds| Instant::now() - Duration::from_millis(milliseconds);
+            for k in 1..=steps {
+                wait.began = ago(500 * k);
+                wait.go_on();
+            }
+            wait.began = ago(end);
+            wait.end();
         };
         wait(1, 990);
-        wait(5, 2700);
+        wait(5, 2655);
         assert_eq!(reported, ["waiting for channel 2 (x)", "channel 2 (x) goes on after 2.7 s"]);
     }
 }

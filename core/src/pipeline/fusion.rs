@@ -178,11 +178,10 @@ impl<'a> Fusion<'a> {
         most: usize,
         output: &mut dyn SplitOutput,
     ) -> Result<usize, ProcessError> {
-        let offsets = std::mem::take(&mut self.offsets);
-        let silence = vec![Silence { offsets: &offsets, frames }; self.parts()];
-        let written = self.step(&silence, most, output);
-        self.offsets = offsets;
-        written
+        // The offsets of the converters, which are 0 once they are subtracted.
+        let silence = self.offsets.repeat(frames);
+        let part = Interleaved::new(&silence, self.offsets.len())?;
+        self.step(&vec![part; self.parts()], most, output)
     }
 
     /// The marks of the outputs of the last step, if gaps are filled.
@@ -250,39 +249,6 @@ impl Output for Kept<'_> {
     fn store_f64(&mut self, isa: Isa, first: usize, samples: &[f64]) {
         if let Some((place, kept)) = self.kept(first, samples.len()) {
             self.output.store_f64(isa, place, &samples[kept]);
-        }
-    }
-}
-
-/// Frames of converters without a signal: their offsets, which are 0 once they are subtracted.
-#[derive(Clone, Copy)]
-struct Silence<'a> {
-    offsets: &'a [f64],
-    frames: usize,
-}
-
-impl Input for Silence<'_> {
-    fn channels(&self) -> usize {
-        self.offsets.len()
-    }
-
-    fn frames(&self) -> usize {
-        self.frames
-    }
-
-    fn is_finite(&self, _: Range<usize>) -> bool {
-        true
-    }
-
-    fn load_f32(&self, _: Isa, _: usize, samples: &mut [f32]) {
-        for (slot, &offset) in samples.iter_mut().zip(self.offsets.iter().cycle()) {
-            *slot = offset as f32;
-        }
-    }
-
-    fn load_f64(&self, _: Isa, _: usize, samples: &mut [f64]) {
-        for (slot, &offset) in samples.iter_mut().zip(self.offsets.iter().cycle()) {
-            *slot = offset;
         }
     }
 }

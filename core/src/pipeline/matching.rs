@@ -92,8 +92,8 @@ pub enum InputMismatch {
     },
     /// A rate that is not the bank's.
     #[error(
-        "{}: the sample rate of each channel is {} Hz, but the bank is designed for slow channels of {} Hz; record at that \
-         rate or design a bank for this one{}",
+        "{}: the sample rate is {} Hz, but the bank is designed for slow channels of {} Hz there; give the recordings in \
+         the order of the converters, record at that rate, or design a bank for this one{}",
         Quoted(.input), Number(*.rate), Number(*.wanted), clocks(*.rate / *.wanted)
     )]
     Rate {
@@ -101,7 +101,7 @@ pub enum InputMismatch {
         input: String,
         /// Its rate in hertz.
         rate: f64,
-        /// That of the bank in hertz.
+        /// That of the converter in hertz.
         wanted: f64,
     },
     /// A rate that is not that of the spec.
@@ -116,22 +116,6 @@ pub enum InputMismatch {
         rate: f64,
         /// That of the spec in hertz.
         wanted: f64,
-    },
-    /// A rate that is not that of the converter.
-    #[error(
-        "{}: the sample rate is {} Hz, but the bank takes {} Hz there, {samples} samples per frame; give the recordings \
-         in the order of the converters, record at that rate, or design a bank for this one{}",
-        Quoted(.input), Number(*.rate), Number(*.wanted), clocks(*.rate / *.wanted)
-    )]
-    OwnRate {
-        /// The input.
-        input: String,
-        /// Its rate in hertz.
-        rate: f64,
-        /// That of the converter in hertz.
-        wanted: f64,
-        /// Samples of the converter per frame.
-        samples: usize,
     },
 }
 
@@ -289,22 +273,25 @@ fn input_rate<'a>(
     inputs: impl Iterator<Item = (&'a str, &'a StreamHeader)>,
     samples: &[usize],
 ) -> Result<Option<f64>, InputMismatch> {
-    let inputs = inputs
-        .zip(samples)
-        .filter_map(|((name, header), &samples)| Some((name, header, header.rate?, samples)));
-    if samples.iter().any(|&samples| samples > 1) {
-        return rate_of_frames(bank, inputs);
+    let rated =
+        inputs.zip(samples).filter_map(|((name, header), &of)| Some((name, header, header.rate?, of)));
+    let rated: Vec<_> = rated.collect();
+    if samples.iter().all(|&samples| samples == 1) {
+        let common = common_rate(rated.iter().map(|&(name, header, ..)| (name, header)))?;
+        if common.is_none() || bank.is_normalised() {
+            return Ok(common);
+        }
     }
-    let inputs: Vec<_> = inputs.map(|(name, header, ..)| (name, header)).collect();
-    let Some(rate) = common_rate(inputs.iter().copied())? else { return Ok(None) };
-    let (first, header) = inputs[0];
-    let wanted = 1.0 / bank.slow_period().0;
-    if !bank.is_normalised() && header.other_rate(wanted).is_some() {
-        // Without the rounding of the periods: it would be shown.
-        let wanted = format!("{wanted:.11e}").parse().unwrap_or(wanted);
-        return Err(InputMismatch::Rate { input: first.to_owned(), rate, wanted });
+    let mut frames = (!bank.is_normalised()).then(|| 1.0 / bank.slow_period().0);
+    for (name, header, rate, samples) in rated {
+        let wanted = *frames.get_or_insert(rate / samples as f64) * samples as f64;
+        if header.other_rate(wanted).is_some() {
+            // Without the rounding of the periods: it would be shown.
+            let wanted = format!("{wanted:.11e}").parse().unwrap_or(wanted);
+            return Err(InputMismatch::Rate { input: name.to_owned(), rate, wanted });
+        }
     }
-    Ok(Some(rate))
+    Ok(frames)
 }
 
 /// The rate of the inputs that state one.
@@ -324,21 +311,6 @@ pub fn common_rate<'a>(
         }
         None => Ok(Some(common)),
     }
-}
-
-/// As [`input_rate`], for converters with rates of their own; each input comes with its samples per frame.
-fn rate_of_frames<'a>(
-    bank: &Bank,
-    inputs: impl Iterator<Item = (&'a str, &'a StreamHeader, f64, usize)>,
-) -> Result<Option<f64>, InputMismatch> {
-    let mut frames = (!bank.is_normalised()).then(|| 1.0 / bank.slow_period().0);
-    for (name, header, rate, samples) in inputs {
-        let wanted = *frames.get_or_insert(rate / samples as f64) * samples as f64;
-        if header.other_rate(wanted).is_some() {
-            return Err(InputMismatch::OwnRate { input: name.to_owned(), rate, wanted, samples });
-        }
-    }
-    Ok(frames)
 }
 
 #[cfg(test)]

@@ -7,8 +7,8 @@ use crate::runtime::{
     Frames, Input, Options, Plan, Planar, Precision, ProcessError, SplitOutput, ThreadPool,
 };
 
-/// Samples of a step in which gaps are filled.
-const GAP_STEP_SAMPLES: usize = 1 << 17;
+/// Samples of a step whose frames are copied: those in which gaps are filled, and those without a signal.
+const COPIED_SAMPLES: usize = 1 << 17;
 
 /// Multiply-adds of a step on one thread: from 2 ms with AVX-512 to 100 ms with double sums on a slow
 /// processor.
@@ -60,9 +60,12 @@ pub fn fuse(
         mask.extend_from_slice(fusion.marks().unwrap_or_default());
         first = end;
     }
-    let missing = wanted - written;
-    after(output, written, &mut |rest| fusion.flush(fusion.flush_frames(missing), missing, rest))?;
-    mask.extend_from_slice(fusion.marks().unwrap_or_default());
+    while written < wanted {
+        let missing = wanted - written;
+        let frames = fusion.flush_frames(missing).min(copied_frames(plan));
+        written += after(output, written, &mut |rest| fusion.flush(frames, missing, rest))?;
+        mask.extend_from_slice(fusion.marks().unwrap_or_default());
+    }
     let outcome = fusion.finish(wanted as u64, 0);
     Ok(Outcome { mask: settings.gaps.map(|_| mask), ..outcome })
 }
@@ -110,9 +113,14 @@ fn step(bank: &Bank, plan: &Plan, settings: Settings<'_>) -> usize {
     let each = multiply_adds_per_frame(bank, plan) + plan.ratio() * MULTIPLY_ADDS_PER_STORE;
     let most = (threads * STEP_MULTIPLY_ADDS / each).max(1).next_multiple_of(plan.alignment());
     match settings.gaps {
-        Some(_) => (GAP_STEP_SAMPLES / plan.channels()).clamp(1, most),
+        Some(_) => copied_frames(plan).min(most),
         None => most,
     }
+}
+
+/// Frames of a step that are copied, at most.
+fn copied_frames(plan: &Plan) -> usize {
+    (COPIED_SAMPLES / plan.channels()).max(1)
 }
 
 /// Multiply-adds of a frame, at most.

@@ -4,18 +4,6 @@ use super::Spec;
 use crate::units::{FastPeriods, Seconds};
 use serde::Serialize;
 
-/// How far the channels may be off, in both directions. All lists have one entry per channel; `T` is the
-/// unit of the delays.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ErrorBox<T = FastPeriods> {
-    /// Largest error of each delay, zero or more.
-    pub delays: Vec<T>,
-    /// Largest relative error of each gain, zero or more.
-    pub gains: Vec<f64>,
-    /// Largest relative error of each cut-off, from 0 to below 0.5: Phi_i(s / (1 + x)) for all |x| up to it.
-    pub cutoffs: Vec<f64>,
-}
-
 /// Errors of the channels. All lists have one entry per channel; `T` is the unit of the delays.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorPoint<T = FastPeriods> {
@@ -26,6 +14,10 @@ pub struct ErrorPoint<T = FastPeriods> {
     /// True cut-off over the one in the spec, minus one.
     pub cutoffs: Vec<f64>,
 }
+
+/// How far the channels may be off, in both directions: the largest size of each error, below 0.5 for a
+/// cut-off, which may be that of Phi_i(s / (1 + x)) for all |x| up to it.
+pub type ErrorBox<T = FastPeriods> = ErrorPoint<T>;
 
 /// Errors of one converter, or their half-widths.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -38,32 +30,13 @@ pub struct ConverterErrors {
     pub cutoff: f64,
 }
 
-impl ErrorBox {
-    /// No errors at all.
-    pub fn none(channels: usize) -> Self {
-        let ErrorPoint { delays, gains, cutoffs } = ErrorPoint::none(channels);
-        Self { delays, gains, cutoffs }
-    }
-
-    /// The half-widths of converter `i`.
-    pub fn of(&self, i: usize) -> ConverterErrors {
-        ConverterErrors { delay: self.delays[i], gain: self.gains[i], cutoff: self.cutoffs[i] }
-    }
-
+impl ErrorPoint {
     /// The number of errors that are not zero.
     pub fn sides(&self) -> usize {
         let shares = self.gains.iter().chain(&self.cutoffs).copied();
         self.delays.iter().map(|delay| delay.0).chain(shares).filter(|half| *half != 0.0).count()
     }
 
-    /// The same box with delays in seconds.
-    pub fn in_seconds(&self, h: Seconds) -> ErrorBox<Seconds> {
-        let Self { delays, gains, cutoffs } = self.clone();
-        ErrorBox { delays: in_seconds(delays, h), gains, cutoffs }
-    }
-}
-
-impl ErrorPoint {
     /// No errors.
     pub fn none(channels: usize) -> Self {
         let zeros = vec![0.0; channels];

@@ -18,8 +18,6 @@ use std::ops::Range;
 
 /// Rounding of a rate and of the fast period in a file, relative to their product.
 const RATE_ROUNDING: f64 = 16.0 * f64::EPSILON;
-/// Most samples per frame for the near rates that a refusal names.
-const NEAR_FRAME: usize = 64;
 
 /// How the samples of the converters make frames.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -151,10 +149,9 @@ fn layout(fast_period: Seconds, rates: &[Hertz]) -> Result<FrameLayout, SpecErro
         limits::check_rate(rate).at(&path)?;
         Step::of(rate, fast_period).ok_or_else(|| {
             let rule = format!(
-                "it is in no simple ratio to the fast rate of {}, so that the instants of the samples do not repeat; a \
-                 rate near it is {}",
-                fast_period.rate(),
-                near_rates(fast_period, &[rate])
+                "it is in no simple ratio to the fast rate of {}, so that the instants of the samples do not repeat; \
+                 choose one that is",
+                fast_period.rate()
             );
             Refusal::new(path, range(rate.0, "Hz", rule))
         })
@@ -173,10 +170,7 @@ fn layout(fast_period: Seconds, rates: &[Hertz]) -> Result<FrameLayout, SpecErro
         let (longest, most) = (limits::MAX_RATIO, limits::MAX_CHANNELS);
         let rule =
             format!("at most {longest} fast samples and {most} samples of the converters make a frame");
-        return Err(Refusal::new(
-            "channel",
-            long_frame(ratio, &samples, &rule, &near_rates(fast_period, rates)),
-        ));
+        return Err(Refusal::new("channel", long_frame(ratio, &samples, &rule)));
     }
     let samples = samples.into_iter().map(|samples| samples as usize).collect();
     Ok(FrameLayout::new(ratio as usize, samples))
@@ -216,25 +210,6 @@ fn other_ratio(written: usize, ratio: usize) -> SpecError {
     Refusal::new("ratio", range(written as f64, "fast samples", rule))
 }
 
-/// Rates near these whose frames are short, in words.
-fn near_rates(fast_period: Seconds, rates: &[Hertz]) -> String {
-    let shares: Vec<f64> = rates.iter().map(|rate| rate.0 * fast_period.0).collect();
-    let samples = |ratio: usize| {
-        shares.iter().map(|share| (share * ratio as f64).round().max(1.0)).collect::<Vec<f64>>()
-    };
-    let fits = |ratio: &usize| samples(*ratio).iter().sum::<f64>() + *ratio as f64 <= NEAR_FRAME as f64;
-    let farthest = |ratio: usize| {
-        let off = samples(ratio).into_iter().zip(&shares);
-        off.map(|(samples, share)| (samples / (share * ratio as f64)).ln().abs()).fold(0.0, f64::max)
-    };
-    let best = (1..NEAR_FRAME).filter(fits).min_by(|&a, &b| farthest(a).total_cmp(&farthest(b)));
-    let Some(ratio) = best else { return "none".to_owned() };
-    // Twelve digits, so that 44 kHz are 44000 Hz.
-    let rounded = |rate: f64| format!("{rate:.11e}").parse().unwrap_or(rate);
-    let rate = |samples: f64| Hertz(rounded(samples / (ratio as f64 * fast_period.0))).to_string();
-    samples(ratio).into_iter().map(rate).collect::<Vec<_>>().join(" and ")
-}
-
 fn greatest_common_divisor(a: u64, b: u64) -> u64 {
     if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
@@ -272,11 +247,7 @@ pub(super) fn check_latency(latency: Option<usize>, wait: usize) -> Result<(), S
 }
 
 /// The samples of a frame, of the output and of all converters, that a design takes.
-pub(super) fn check_size(
-    layout: &FrameLayout,
-    is_coupled: bool,
-    fast_period: Seconds,
-) -> Result<(), SpecProblem> {
+pub(super) fn check_size(layout: &FrameLayout, is_coupled: bool) -> Result<(), SpecProblem> {
     let most = if is_coupled { limits::MAX_COUPLED_FRAME } else { limits::MAX_FRAME };
     let all = layout.ratio + layout.count();
     if all <= most {
@@ -288,17 +259,15 @@ pub(super) fn check_size(
     if layout.is_plain() {
         return Err(range(all as f64, "samples per frame", rule));
     }
-    let rate = |&samples: &usize| Hertz(samples as f64 / (layout.ratio as f64 * fast_period.0));
-    let rates: Vec<Hertz> = layout.samples.iter().map(rate).collect();
     let samples: Vec<u64> = layout.samples.iter().map(|&samples| samples as u64).collect();
-    Err(long_frame(layout.ratio as u64, &samples, &rule, &near_rates(fast_period, &rates)))
+    Err(long_frame(layout.ratio as u64, &samples, &rule))
 }
 
-/// Rates whose frames are too long; `near` are rates with short ones.
-fn long_frame(ratio: u64, samples: &[u64], rule: &str, near: &str) -> SpecProblem {
+/// Rates whose frames are too long.
+fn long_frame(ratio: u64, samples: &[u64], rule: &str) -> SpecProblem {
     let samples = samples.iter().map(u64::to_string).collect::<Vec<_>>().join(" and ");
     let rule = format!(
-        "it has {samples} samples of the converters; {rule}; rates near these with short frames are {near}"
+        "it has {samples} samples of the converters; {rule}; choose rates in ratios of small numbers"
     );
     range(ratio as f64, "fast samples per frame", rule)
 }
@@ -357,11 +326,5 @@ mod tests {
         let whole: Vec<f64> = delays.iter().map(|delay| delay.whole()).collect();
         assert_eq!(whole, [12.0, 9.0, 6.0, 3.0, 0.0, 14.0, 9.0, 4.0]);
         assert!(delays.iter().all(|delay| delay.rest() == Seconds(0.0)));
-    }
-
-    #[test]
-    fn near_rates_have_short_frames() {
-        assert_eq!(near_rates(Hertz(96e3).period(), &[Hertz(44.1e3), Hertz(48e3)]), "44000 Hz and 48000 Hz");
-        assert_eq!(near_rates(Hertz(48e3).period(), &[Hertz(16_000.5)]), "16000 Hz");
     }
 }

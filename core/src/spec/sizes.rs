@@ -20,7 +20,7 @@ const BAND_POLES: usize = 16;
 impl Spec {
     /// The sizes of the design problem, with what is chosen later left out.
     pub(super) fn check_sizes(&self, layout: &FrameLayout) -> Result<(), SpecError> {
-        frames::check_size(layout, self.design.is_coupled(), self.fast_period).at("channel")?;
+        frames::check_size(layout, self.design.is_coupled()).at("channel")?;
         let front_ends = self.front_end_states();
         let rule = format!(
             "the distinct filters of the channels, the target and the signal have at most {MAX_FRONT_END_STATES} poles in all; \

@@ -192,7 +192,7 @@ impl<T: Sample> Direct<T> {
     /// The frames of a block in memory whose windows may hold samples that are not finite.
     fn suspects(&self, samples: &[T], block: Range<usize>) -> Range<usize> {
         let n = self.channels;
-        let places = not_finite(self.isa, &samples[block.start * n..block.end * n]);
+        let places = not_finite(&samples[block.start * n..block.end * n]);
         let first = block.start + places.start / n;
         if first < self.history_frames {
             // The windows of the first frames begin in the history.

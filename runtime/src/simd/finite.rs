@@ -53,43 +53,11 @@ impl<T: Element> Kernel for ReplaceNotFinite<T> {
     }
 }
 
-/// Vectors of a block, whose sum tells.
-const BLOCK: usize = 4;
-
-/// The samples from the block of the first one that is not finite to that of the last one; none if all are.
-pub(crate) fn not_finite<T: Element>(isa: Isa, samples: &[T]) -> Range<usize> {
-    // SAFETY: the kernel asks nothing of its job.
-    unsafe { compiled::<NotFinite<T>>(isa)(samples) }
-}
-
-struct NotFinite<T>(PhantomData<T>);
-
-impl<T: Element> Kernel for NotFinite<T> {
-    type Sample = T;
-    type Job<'a> = &'a [T];
-    type Output = Range<usize>;
-
-    /// What is not finite stays so in a sum, so that few samples are asked one by one.
-    #[inline(always)]
-    unsafe fn run<V: Vector<Sample = T>>(samples: &[T]) -> Range<usize> {
-        let (len, mut first, mut places) = (BLOCK * V::LANES, 0, 0..0);
-        while first < samples.len() {
-            let blocks = samples[first..].chunks_exact(len);
-            first += len * blocks.take_while(|block| sum::<V>(block).finite()).count();
-            let end = samples.len().min(first + len);
-            if samples[first..end].iter().fold(false, |any, sample| any | !sample.is_finite()) {
-                places = if places.is_empty() { first } else { places.start }..end;
-            }
-            first = end;
-        }
-        places
-    }
-}
-
-/// The sum of the vectors of a block, which is there.
-#[inline(always)]
-unsafe fn sum<V: Vector>(block: &[V::Sample]) -> V {
-    (1..BLOCK).fold(V::load(block.as_ptr()), |sum, v| sum.add(V::load(block.as_ptr().add(v * V::LANES))))
+/// From the first sample that is not finite to the last one; none if all are.
+pub(crate) fn not_finite<T: Element>(samples: &[T]) -> Range<usize> {
+    let is_lost = |sample: &T| !sample.is_finite();
+    let first = samples.iter().position(is_lost).unwrap_or(samples.len());
+    first..samples[first..].iter().rposition(is_lost).map_or(first, |last| first + last + 1)
 }
 
 #[cfg(test)]
@@ -113,7 +81,7 @@ mod tests {
     fn sums_that_overflow_are_finite_samples() {
         for isa in Isa::available() {
             let mut samples = [f32::MAX; 200];
-            assert!(not_finite(isa, &samples).is_empty());
+            assert!(not_finite(&samples).is_empty());
             assert_eq!(replace_not_finite(isa, &mut samples), Replaced { count: 0, places: 0..0 });
         }
     }
@@ -125,19 +93,19 @@ mod tests {
             let lengths: &[usize] = if cfg!(miri) { &[1, 35] } else { &[1, 7, 63, 64, 65, 200] };
             for &len in lengths {
                 let clean: Vec<f32> = (0..len).map(|i| i as f32 - 50.0).collect();
-                assert!(not_finite(isa, &clean).is_empty());
+                assert!(not_finite(&clean).is_empty());
                 for place in 0..len {
                     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
                         let mut samples = clean.clone();
                         samples[place] = bad;
-                        assert!(not_finite(isa, &samples).contains(&place), "{bad} at {place} of {len}");
+                        assert!(not_finite(&samples).contains(&place), "{bad} at {place} of {len}");
                         check_replaced(isa, samples.clone(), &[place]);
                         // Two infinities do not cancel.
                         samples[(place + 64) % len] = -bad;
-                        assert!(!not_finite(isa, &samples).is_empty());
+                        assert!(!not_finite(&samples).is_empty());
                         check_replaced(isa, samples.clone(), &[place, (place + 64) % len]);
                         let wide: Vec<f64> = samples.iter().map(|&x| f64::from(x)).collect();
-                        assert!(!not_finite(isa, &wide).is_empty());
+                        assert!(!not_finite(&wide).is_empty());
                     }
                 }
             }

@@ -34,7 +34,7 @@ fn arrays_of_every_class_are_interleaved_frames() {
         ("single", PcmFormat::F32Le, 1, None, first.clone()),
         ("int16", PcmFormat::S16Le, 2, None, scaled(16)),
         ("int8", PcmFormat::S8, 2, None, scaled(8)),
-        ("big", PcmFormat::F64Le, 2, None, both.iter().map(|x| 8.0 * x).collect()),
+        ("stored", PcmFormat::F64Le, 2, None, both.iter().map(|x| 8.0 * x).collect()),
     ] {
         let (header, samples) = read(&bytes(name), None).unwrap();
         assert_eq!((header.layout.format, header.channels, header.rate), (format, channels, rate), "{name}");
@@ -84,10 +84,13 @@ fn other_files_are_named_for_what_they_are() {
     let refused = |bytes: &[u8]| read(bytes, None).unwrap_err();
     let mut newer = bytes("double");
     newer[..10].copy_from_slice(b"MATLAB 7.3");
+    let mut swapped = bytes("double");
+    swapped[124..128].copy_from_slice(b"\x01\x00MI");
     for (bytes, part) in [
+        (swapped, "its numbers are big-endian, which is not read; save it in MATLAB with save("),
         (newer, "version 7.3 (HDF5), which is not read; save it in MATLAB with save("),
         (b"RIFF".to_vec(), "it has 4 bytes"),
-        (vec![b'x'; 200], "are not IM or MI"),
+        (vec![b'x'; 200], "are not IM as in version 5"),
         (bytes("double")[..200].to_vec(), "copy it again"),
         (bytes("compressed")[..180].to_vec(), "copy it again"),
     ] {

@@ -20,7 +20,7 @@ fn filler(bank: &Bank, policy: GapPolicy) -> GapFiller {
 
 /// Fills whole frames; their marks, and whether they were filled.
 fn fill(filler: &mut GapFiller, frames: &mut [f64]) -> (Vec<u8>, bool) {
-    let n = filler.places.len();
+    let n = filler.samples.len();
     let is_filled = filler.fill(&[Interleaved::new(frames, n).unwrap()]);
     if is_filled {
         frames.copy_from_slice(filler.filled(0));
@@ -222,34 +222,7 @@ fn the_mask_is_that_of_the_definition_for_filters_with_zeros_and_any_gaps() {
     }
 }
 
-/// Additions for so many frames with `lost` frames of each channel missing at the start of every period.
-fn work(taps: Vec<Vec<f64>>, frames: usize, period: usize, lost: usize) -> u64 {
-    let n = taps.len();
-    let mut gaps = filler(&fir_bank(taps, 2), GapPolicy::Zero);
-    let mut samples = vec![1.0; n * frames];
-    samples.chunks_mut(n * period).for_each(|period| period[..n * lost].fill(f64::NAN));
-    fill(&mut gaps, &mut samples);
-    gaps.affected.unwrap().additions
-}
-
 #[test]
-fn the_work_of_a_frame_does_not_grow_with_the_filters() {
-    let dense = |length: usize| vec![vec![1.0; length]; 2];
-    for (period, lost) in [(1000, 1), (4000, 3000)] {
-        let (short, long) = (work(dense(16), 4000, period, lost), work(dense(65_536), 4000, period, lost));
-        assert_eq!(short, long);
-        assert!(long <= 4000 * (2 + 2 * 2) + 4000 / period as u64 * 2 * 2 * 2, "{long}");
-    }
-    // Where every other tap of a phase is zero, a gap costs one pass over the taps, however long it is.
-    let sparse: Vec<f64> = (0..4096).map(|t| f64::from(u8::from(t % 4 < 2))).collect();
-    let gap = |lost| work(vec![sparse.clone()], 4000, 4000, lost);
-    assert!(gap(1) <= 4000 * 2 + 2 + 4096, "{}", gap(1));
-    assert!(gap(3000) <= 4000 * 2 + 3000 * 2 + 4096, "{}", gap(3000));
-}
-
-#[test]
-fn lags_that_follow_each_other_are_one_interval() {
-    let nonzero = [vec![0, 1], vec![0], vec![], vec![0]];
-    let lags = |first, last| Lags { first, last };
-    assert_eq!(intervals(&nonzero, 2), [vec![lags(0, 1), lags(3, 3)], vec![lags(0, 0)]]);
+fn nonzero_taps_that_follow_each_other_are_one_run() {
+    assert_eq!(nonzero_runs([0.0, 1.0, 2.0, 0.0, 3.0].into_iter()), [1..3, 4..5]);
 }
