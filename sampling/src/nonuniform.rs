@@ -31,15 +31,6 @@ impl Measured {
     }
 }
 
-/// Bounds of the function that is sampled, on the hull of the samples.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Smoothness {
-    /// sup |f'|.
-    pub slope: f64,
-    /// sup |f''|.
-    pub curvature: f64,
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

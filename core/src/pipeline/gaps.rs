@@ -67,9 +67,9 @@ struct Converter {
 
 /// Fills gaps frame by frame.
 ///
-/// Output p of frame k is y\[kM + p\] = sum_i sum_j f_i\[p + jM\] x_i\[k - j\], so a missing x_i\[k\] affects
-/// y\[kM + n\] if and only if f_i\[n\] is not zero. It marks these outputs at once, which takes less time than
-/// filtering it.
+/// Output p of frame k is y\[kM + p\] = sum_i sum_j f_i\[p + jM\] x_i\[k - j\], so a missing x_i\[k\]
+/// affects y\[kM + n\] if and only if f_i\[n\] is not zero. It marks these outputs at once, which takes less
+/// time than filtering it.
 #[derive(Debug, Clone)]
 pub(super) struct GapFiller {
     policy: GapPolicy,

@@ -1,7 +1,16 @@
 //! Linear interpolation between samples with errors and jitter, and its bounds (thesis Prop. 3.1).
 
 use hybank_sampling::SamplingError;
-use hybank_sampling::nonuniform::{Measured, Smoothness};
+use hybank_sampling::nonuniform::Measured;
+
+/// Bounds of the function that is sampled, on the hull of the samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Smoothness {
+    /// sup |f'|.
+    pub slope: f64,
+    /// sup |f''|.
+    pub curvature: f64,
+}
 
 /// Piecewise linear interpolation through measured samples, with its error bound (Prop. 3.1).
 #[derive(Debug, Clone, PartialEq)]

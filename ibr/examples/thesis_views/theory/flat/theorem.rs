@@ -2,7 +2,7 @@
 
 use super::{FlatCamera, PaintedCurve, cross};
 use crate::theory::periodic::PeriodicSets;
-use hybank_sampling::nonuniform::Smoothness;
+use crate::theory::piecewise_linear::Smoothness;
 
 /// Nodes at which suprema and means over the curve are taken.
 const NODES: usize = 4000;

@@ -1,7 +1,5 @@
 //! What the tests of all crates read from the environment, and the list of what they skipped.
 //!
-//! Unit tests have this file as a module, through a link, because their packages stand without this crate.
-//!
 //! | variable | meaning |
 //! | --- | --- |
 //! | `HYBANK_DATA` | the folder of recordings and photographs, `shared/data` beside the repository if not set |
