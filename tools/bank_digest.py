@@ -1,4 +1,4 @@
-"""The digest of a bank file by another route than src/bank/digest.rs, for its test: python3 bank_digest.py BANK.json"""
+"""The digest of a bank file by another route than core/src/bank/digest.rs, for its test: python3 bank_digest.py BANK.json"""
 import hashlib
 import json
 import struct
