@@ -1,7 +1,7 @@
 //! Why recordings cannot be aligned, and what a reader of an alignment must know.
 
 use crate::calibrate::{CalibrateError, Warning};
-use crate::units::FastPeriods;
+use crate::units::{FastPeriods, Seconds};
 
 /// Why recordings cannot be aligned.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -101,6 +101,18 @@ pub enum AlignWarning {
         channel: usize,
         /// Largest minus smallest delay.
         moved: FastPeriods,
+    },
+    /// Two channels come to sample at one instant.
+    #[error(
+        "{at:.3} after the first frame the channels {} and {} sample at one instant: no bank recovers the signal there. \
+         Leave that stretch out, or use more recorders than the ratio",
+        channels[0], channels[1]
+    )]
+    Coincidence {
+        /// From 1.
+        channels: [usize; 2],
+        /// Time from the first frame on.
+        at: Seconds,
     },
     /// What the values mean.
     #[error(transparent)]

@@ -5,6 +5,7 @@
 //! gains and offsets. A smoothing spline goes through the delays, as through any readings that are known
 //! beforehand.
 
+mod coincidence;
 mod course;
 mod error;
 mod pieces;
@@ -207,6 +208,13 @@ fn alignment(
     let measured = estimates.len();
     let (spec, raised) = course.spec(&channels, &mut warnings);
     channels.iter_mut().for_each(|channel| channel.delay.value += spec.fast_period * raised as f64);
+    // With more channels than needed nothing is lost where two are one.
+    if channels.len() <= spec.ratio {
+        let lasts = spec.fast_period * (spec.ratio * frames) as f64;
+        let met = coincidence::first_coincidence(&spec, &channels, lasts);
+        warnings
+            .extend(met.map(|(pair, at)| AlignWarning::Coincidence { channels: pair.map(|i| i + 1), at }));
+    }
     let readings = course.readings(&skips, raised);
     Alignment { reference, channels, frames, pieces, measured, readings, spec, warnings }
 }

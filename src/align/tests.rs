@@ -194,3 +194,28 @@ fn taps_that_stay_are_named() {
         found.warnings
     );
 }
+
+/// Delays of 0.5 and 1.0 fast periods are together when the second has moved by 0.45.
+#[test]
+fn recorders_that_come_to_sample_at_one_instant_are_named() {
+    let text = "fast_rate = 8000.0\nratio = 2\nlatency = 16\ntarget = { filter = { family = \"rc\", cutoff = 1500.0 } }\n\
+                channel = [{ delay_samples = 0.5 }, { delay_samples = 1.0 }]\n";
+    let spec = Spec::from_toml(text, "spec.toml").unwrap();
+    let exact = |value: f64| Estimate { value, sigma: 0.0 };
+    let named = |drift: f64, frames: usize| {
+        let channel = |i: usize| AlignedChannel {
+            skip: 0,
+            delay: Estimate { value: spec.channels[i].delay, sigma: Seconds(0.0) },
+            drift: exact(if i == 0 { 0.0 } else { drift }),
+            gain: exact(1.0),
+            offset: exact(0.0),
+        };
+        let lasts = spec.fast_period * (2 * frames) as f64;
+        coincidence::first_coincidence(&spec, &[channel(0), channel(1)], lasts).map(|(pair, at)| (pair, at.0))
+    };
+    let (channels, at) = named(-1e-5, 100_000).unwrap();
+    let want = 0.45 / 8000.0 / 1e-5;
+    assert!(channels == [0, 1] && (at - want).abs() < 1e-9 * want, "{channels:?} {at}");
+    // The recordings end before, or the clocks are one.
+    assert_eq!((named(-1e-5, 20_000), named(0.0, 100_000)), (None, None));
+}
