@@ -139,7 +139,7 @@ fn what_does_not_fit_a_bank_is_counted_as_people_do() {
     fast["fast_period"] = (1.0 / 3e8).into();
     desk.write("fast.json", fast.to_string());
     let args = ["fuse", "fast.json", "a.wav", "b.wav", "-o", "out.wav"];
-    desk.refused(1, &args, &["each channel is ", "slow channels of 150000000 Hz;"]);
+    desk.refused(1, &args, &["24000 Hz", "slow channels of 150000000 Hz"]);
 }
 
 /// So many threads of readers that the system had no memory maps left: a panic of the standard library.
@@ -187,7 +187,7 @@ fn nesting_is_refused() {
         );
     }
     desk.write("deep.json", format!("{{\"format\": \"hybank-bank\",\n\"spec\": {}", "[".repeat(500)));
-    desk.refused(1, &["analyze", "deep.json"], &["deep.json: line 2, column", "nested too deeply"]);
+    desk.refused(1, &["analyze", "deep.json"], &["deep.json: ", "line 2, column"]);
 }
 
 /// "Is a directory (os error 21)", of the metadata.
