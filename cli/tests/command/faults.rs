@@ -97,7 +97,7 @@ fn without_threads_the_work_is_done_or_refused_in_one_line() {
     for (args, part) in [
         ("stream bank.json --input in", "in: cannot start a thread that reads it"),
         ("stream bank.json <in", "cannot start a thread that reads it"),
-        ("stream bank.json --threads 2 <in", "--threads 2"),
+        ("stream bank.json --threads 2 <in", "cannot start a thread that reads it"),
     ] {
         let output = run(args);
         let message = text(&output.stderr);
