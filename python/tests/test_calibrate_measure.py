@@ -118,7 +118,7 @@ def test_complex_signals_are_captured_part_by_part():
     np.testing.assert_array_equal(both.channels, parts[0].channels + 1j * parts[1].channels)
     np.testing.assert_array_equal(both.target, parts[0].target + 1j * parts[1].target)
     assert hb.simulate(spec, [0, 1, 2, 3]).channels.dtype == np.float64
-    with pytest.raises(hb.HybankError, match="sample 1 of the signal is NaN"):
+    with pytest.raises(hb.HybankError, match="sample 1 is NaN"):
         hb.simulate(spec, [0.0, np.nan])
 
 

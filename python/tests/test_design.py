@@ -147,7 +147,7 @@ def test_errors_of_a_text_have_line_caret_and_remedy():
         ({"fast_rate": float("inf")}, "fast_rate", "out of range"),
         ({"fast_rate": np.nan}, "fast_rate", "NaN"),
         ({"channel": [{"delay": -1e-6}]}, "channel[0].delay", "out of range"),
-        ({"channel": [{"delay": True}]}, "channel[0].delay", "true or false"),
+        ({"channel": [{"delay": True}]}, "channel[0].delay", "found true"),
         ({"design": {"method": "fur"}}, "design.method", 'did you mean "fir"'),
         ({"target": {"filter": {"num": np.array([1.0]), "den": np.array([1.0])}}}, "target.filter.den", "no pole"),
     ],
