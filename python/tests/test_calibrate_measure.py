@@ -50,7 +50,7 @@ def test_wrong_calibrations_are_refused():
     x, spec = np.zeros((2, 100)), plant([60e-9, 30e-9])
     for keywords, words in [
         ({"tones": [1e6], "blind": True}, "one of tones, waveform and blind"),
-        ({"tones": [-1.0]}, "positive"),
+        ({"tones": [-1.0]}, "above 0"),
         ({"fit": ["delays"]}, "can be fitted"),
         ({"reference": 0}, "count from 1"),
         ({"clip": -1.0}, "positive level"),
