@@ -40,7 +40,11 @@ impl CaptureCheck {
     pub(super) fn observe(&mut self, recordings: &[PcmFrames<'_>]) {
         let Self::Collecting { samples, frames, .. } = self else { return };
         let missing = *frames - samples.first().map_or(0, Vec::len);
-        let block = OfflineSamples::of_frames(recordings, missing).channels;
+        let Ok(OfflineSamples { channels: block, .. }) = OfflineSamples::of_frames(recordings, missing)
+        else {
+            *self = Self::Done(Verdict::Unjudged.into());
+            return;
+        };
         samples.iter_mut().zip(block).for_each(|(samples, more)| samples.extend(more));
         if samples.iter().all(|samples| samples.len() >= *frames) {
             self.judge();

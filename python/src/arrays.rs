@@ -1,6 +1,6 @@
 //! Arrays as inputs of a bank, without a copy.
 
-use crate::errors::refused;
+use crate::errors::{capture_error, refused};
 use crate::formats::Format;
 use hybank::bank::FrameLayout;
 use hybank::captures::Captures;
@@ -134,7 +134,7 @@ impl<'py> Held<'py> {
 
     /// The samples as numbers, each channel by itself.
     pub(crate) fn captures(&self) -> PyResult<Captures> {
-        Ok(Captures::of_frames(&self.recordings()?, self.format.complex))
+        Captures::of_frames(&self.recordings()?, self.format.complex).map_err(capture_error)
     }
 }
 

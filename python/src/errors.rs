@@ -6,7 +6,7 @@ use hybank::io::{IoError, OfflineError};
 use hybank::messages::{Quoted, shown};
 use hybank::spec;
 use pyo3::create_exception;
-use pyo3::exceptions::{PyFileExistsError, PyOSError, PyValueError};
+use pyo3::exceptions::{PyFileExistsError, PyMemoryError, PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::fmt::Display;
@@ -89,6 +89,9 @@ pub(crate) fn io_error(error: IoError) -> PyErr {
 pub(crate) fn capture_error(error: CaptureError) -> PyErr {
     match error {
         CaptureError::Io(error) | CaptureError::Samples(OfflineError::Io(error)) => io_error(error),
+        CaptureError::Samples(error @ OfflineError::Memory { .. }) => {
+            PyMemoryError::new_err(shown(&error.to_string()))
+        }
         other => refused(other),
     }
 }

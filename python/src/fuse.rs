@@ -2,7 +2,7 @@
 
 use crate::arrays::{Held, Shape};
 use crate::background::{self, Signals};
-use crate::errors::{choose, refused, warn};
+use crate::errors::{capture_error, choose, refused, warn};
 use crate::formats::Format;
 use crate::outputs::NewArray;
 use crate::results::Made;
@@ -75,7 +75,8 @@ fn judged(bank: &Bank, held: &Held<'_>) -> PyResult<Agreement> {
         Err(verdict) => return Ok(verdict.into()),
     };
     let most = frames_for_agreement(spec.channels.len());
-    let channels = OfflineSamples::of_frames(&held.recordings()?, most).channels;
+    let samples = OfflineSamples::of_frames(&held.recordings()?, most);
+    let channels = samples.map_err(|error| capture_error(error.into()))?.channels;
     let records: Vec<Record> = channels.into_iter().map(Record::new).collect();
     background::run(held.py(), None, move |_| agreement(&spec, &records))
 }

@@ -157,7 +157,6 @@ for run in runs:
 """
 
 
-@pytest.mark.xfail(reason="known fault: samples in memory are copied without asking for room first", strict=False)
 @pytest.mark.skipif(sys.platform != "linux", reason="limits the address space")
 def test_too_little_memory_is_a_memory_error(filters, tmp_path):
     command = [sys.executable, "-c", MEMORY, filters / "thesis-fir.json", tmp_path / "sparse"]

@@ -12,12 +12,12 @@ import hybank as hb
 KINDS = [("thesis-fir", "direct"), ("thesis-fir", "overlap-save"), ("thesis-iir", "auto")]
 
 
-@pytest.mark.xfail(reason="known fault: overlap-save of integer samples differs at one cut", strict=False)
 @pytest.mark.parametrize("dtype", ["f4", "f8", "i2", "c8"])
 @pytest.mark.parametrize("name, algorithm", KINDS)
 def test_a_stream_goes_on_from_its_state(filters, random, name, algorithm, dtype):
     bank = hb.load(filters / f"{name}.json")
-    x = 2 * random.standard_normal((2, 900))
+    # More than the latency of overlap-save, so that samples come out.
+    x = 2 * random.standard_normal((2, 4000))
     x = (x + 1j * x[::-1]).astype("c8") if dtype == "c8" else x
     settings = {"dtype": dtype, "algorithm": algorithm}
     s = bank.stream(**settings)
@@ -28,7 +28,7 @@ def test_a_stream_goes_on_from_its_state(filters, random, name, algorithm, dtype
         assert not other.agrees(s.state)
         np.testing.assert_array_equal(other.process(x[:, 333:]), y)
         assert other.agrees(s.state) and other.state == s.state
-        assert (other.position, other.clipped, other.algorithm) == (900, s.clipped, s.algorithm)
+        assert (other.position, other.clipped, other.algorithm) == (4000, s.clipped, s.algorithm)
     assert (s.clipped > 0) == (dtype == "i2")
 
 

@@ -95,7 +95,6 @@ def test_an_imaginary_part_is_the_other_half_of_a_complex_signal(bank):
     np.testing.assert_array_equal(both.target, real.target + 1j * imaginary.target)
 
 
-@pytest.mark.xfail(reason="known fault: compares an option that went", strict=False)
 def test_worst_cases_over_boxes_are_those_of_the_command_line(folder, binary):
     flags = ["--delay-box", "0.02samples", "--gain-box", "0.2%"]
     want = json.loads(run(binary, folder, "analyze", "bank.json", *flags, "--certify", "--json"))
@@ -106,7 +105,7 @@ def test_worst_cases_over_boxes_are_those_of_the_command_line(folder, binary):
     assert found.gamma == want["gamma"] <= found.worst_case.attained <= found.worst_case.upper
     plain = hb.analyze(folder / "bank.json")
     assert plain.worst_case is plain.certified is plain.with_errors is None
-    moved = hb.analyze(folder / "bank.json", delay_error="0.02samples")
+    moved = hb.analyze(folder / "bank.json", delay_error=["0samples", "0.02samples"])
     assert moved.with_errors.snr_db < plain.figures.snr.total_db
     own = hb.analyze(folder / "bank.json", delay_box=[0, "0.02samples"])
     assert own.worst_case.errors.delays[0] == 0 < own.worst_case.errors.delays[1]
@@ -124,7 +123,6 @@ def test_wrong_boxes_name_their_keyword(bank):
             hb.analyze(bank, **given)
 
 
-@pytest.mark.xfail(reason="known fault: another message than the command line", strict=False)
 def test_a_record_is_compared_as_the_command_line_does(folder, binary, random):
     n = np.arange(3000)
     want = 0.3 * np.cos(0.2 * n) + 0.05 * random.standard_normal(len(n))
@@ -143,13 +141,12 @@ def test_a_record_is_compared_as_the_command_line_does(folder, binary, random):
         hb.measure(have, 48e3, ref=want, tones=[1e3])
     with pytest.raises(hb.HybankError, match="^ref: complex"):
         hb.measure(have + 0j, 48e3, ref=want)
-    with pytest.raises(hb.HybankError, match="^skip: 1500 leaves nothing"):
+    with pytest.raises(hb.HybankError, match="^skip: 1500 samples at either end leave nothing of 3000"):
         hb.measure(have, 48e3, skip=1500)
     with pytest.raises(hb.HybankError, match="^rate: "):
         hb.measure(have)
 
 
-@pytest.mark.xfail(reason="known fault: another message than the command line", strict=False)
 def test_files_are_fused_to_the_bits_of_the_command_line(folder, binary, bank, random):
     soundfile = pytest.importorskip("soundfile")
     x = 0.3 * random.standard_normal((2, 3001))
@@ -173,7 +170,7 @@ def test_files_are_fused_to_the_bits_of_the_command_line(folder, binary, bank, r
     soundfile.write(folder / "slow.wav", x.T, 22050, subtype="FLOAT")
     with pytest.raises(hb.HybankError, match="22050 Hz, but the bank is designed for slow channels of 24000 Hz"):
         bank.fuse(folder / "slow.wav")
-    with pytest.warns(UserWarning, match="slow.wav: the sample rate is 22050 Hz, but .*a0.wav has 24000 Hz; give bank="):
+    with pytest.warns(UserWarning, match="slow.wav: the sample rate is 22050 Hz, but .*a0.wav has 24000 Hz; .*give bank="):
         hb.read([files[0], folder / "slow.wav"])
     # Recordings that were read without the bank are of another rate as files are.
     both = hb.read(folder / "slow.wav")
@@ -182,7 +179,6 @@ def test_files_are_fused_to_the_bits_of_the_command_line(folder, binary, bank, r
     assert bank.fuse(both.channels).shape == (6002,)
 
 
-@pytest.mark.xfail(reason="known fault: the context of the error is shown", strict=False)
 @pytest.mark.parametrize("name", ["nix.wav", "nix.npy", "nix.csv", "nix.mat:x", "nix.sigmf-meta"])
 def test_a_missing_file_is_a_file_not_found_error(folder, bank, name):
     soundfile = pytest.importorskip("soundfile")
@@ -191,7 +187,7 @@ def test_a_missing_file_is_a_file_not_found_error(folder, bank, name):
     for call in (bank.fuse, hb.read, lambda x: hb.calibrate(x, SPEC), lambda x: hb.align(x, SPEC), lambda x: hb.measure(x[1])):
         with pytest.raises(FileNotFoundError) as caught:
             call(files)
-        assert caught.value.filename == str(folder / name.split(":")[0]) and caught.value.__suppress_context__
+        assert caught.value.filename == str(folder / name.split(":")[0]) and caught.value.__context__ is None
     with pytest.raises(FileNotFoundError):
         hb.Recording(folder / "nix.sigmf-meta")
     with pytest.raises(FileNotFoundError):

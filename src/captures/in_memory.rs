@@ -36,15 +36,18 @@ impl Captures {
     }
 
     /// From samples in memory; of complex ones each part is a channel of the frames.
-    pub fn of_frames(frames: &[PcmFrames<'_>], is_complex: bool) -> Self {
+    ///
+    /// # Errors
+    /// [`CaptureError::Samples`] if there is no memory for the numbers.
+    pub fn of_frames(frames: &[PcmFrames<'_>], is_complex: bool) -> Result<Self, CaptureError> {
         let rails = frames.iter().flat_map(|part| {
             let header = StreamHeader::real(part.layout, part.channels);
             std::iter::repeat_n(header.rails, part.channels)
         });
         let rails = rails.step_by(if is_complex { 2 } else { 1 });
-        let channels = OfflineSamples::of_frames(frames, usize::MAX).channels;
+        let channels = OfflineSamples::of_frames(frames, usize::MAX)?.channels;
         let channels = with_rails(channels, is_complex, rails);
-        Self { name: "the captures".into(), channels, rate: None, is_cut: false }
+        Ok(Self { name: "the captures".into(), channels, rate: None, is_cut: false })
     }
 
     /// Refuses all but one channel, before it is read.
@@ -89,7 +92,7 @@ mod tests {
     fn the_parts_of_complex_frames_are_one_channel() {
         let bytes: Vec<u8> = (1..=8u8).collect();
         let frames = PcmFrames { layout: SampleLayout::packed(PcmFormat::S8), channels: 4, bytes: &bytes };
-        let captures = Captures::of_frames(&[frames], true);
+        let captures = Captures::of_frames(&[frames], true).unwrap();
         let of = |numbers: [f64; 2]| numbers.map(|x| x / 128.0).to_vec();
         let rails = Some((-1.0, 127.0 / 128.0));
         let first = ChannelSamples { samples: of([1.0, 5.0]), imaginary: Some(of([2.0, 6.0])), rails };

@@ -9,11 +9,12 @@
 //! // Two frames of two channels.
 //! let bytes: Vec<u8> = [0i16, -32768, 16384, 32767].into_iter().flat_map(i16::to_le_bytes).collect();
 //! let frames = PcmFrames { layout: SampleLayout::packed(PcmFormat::S16Le), channels: 2, bytes: &bytes };
-//! let captures = Captures::of_frames(&[frames], false);
+//! let captures = Captures::of_frames(&[frames], false)?;
 //! assert_eq!(captures.channels[0].samples, [0.0, 0.5]);
 //! assert_eq!(captures.channels[1].rails, Some((-1.0, 32767.0 / 32768.0)));
 //! // Both samples of the second channel are at an end of their range.
 //! assert_eq!(captures.channels[1].record(None).clipped, 2);
+//! # Ok::<(), hybank::captures::CaptureError>(())
 //! ```
 
 mod channel;

@@ -21,11 +21,14 @@ fn the_worst_case_has_a_bound_and_is_attained() {
         desk.json(&["analyze", "bank.json", "--delay-box", "0.1samples", "--reference", "none", "--json"]);
     let case = &all["worst_case"];
     let (attained, upper) = (number(&case["attained"]), number(&case["upper"]));
-    assert!(
-        (attained / 0.0478338 - 1.0).abs() < 1e-3 && upper > attained && upper <= 2.0 * attained,
-        "{case}"
-    );
+    assert!((attained / 0.0478338 - 1.0).abs() < 1e-3 && upper > attained, "{case}");
     assert_eq!(case["point"]["delays"].as_array().unwrap().len(), 2);
+    // Small boxes have a close bound.
+    for width in ["0.001samples", "0.01samples"] {
+        let all = desk.json(&["analyze", "bank.json", "--delay-box", width, "--reference", "none", "--json"]);
+        let [attained, upper] = ["attained", "upper"].map(|key| number(&all["worst_case"][key]));
+        assert!(upper > attained && upper <= 1.5 * attained, "{width}: {attained} {upper}");
+    }
     let one = desk.json(&["analyze", "bank.json", "--delay-box", "0.1samples", "--json"]);
     assert_eq!(one["worst_case"]["errors"]["delays"], serde_json::json!([0.0, 0.1]));
     assert!(number(&one["worst_case"]["upper"]) < upper);

@@ -69,10 +69,15 @@ impl OfflineSamples {
     }
 
     /// From at most `most` frames in memory.
-    pub fn of_frames(frames: &[PcmFrames<'_>], most: usize) -> Self {
+    ///
+    /// # Errors
+    /// [`OfflineError::Memory`].
+    pub fn of_frames(frames: &[PcmFrames<'_>], most: usize) -> Result<Self, OfflineError> {
         let mut channels = vec![Vec::new(); frames.iter().map(|part| part.channels).sum()];
+        let longest = frames.iter().map(PcmFrames::frames).max().unwrap_or_default();
+        reserve(&mut channels, longest.min(most))?;
         append(frames, most, &mut channels);
-        Self { channels, is_cut: false }
+        Ok(Self { channels, is_cut: false })
     }
 }
 

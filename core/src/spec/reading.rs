@@ -27,7 +27,8 @@ pub(super) fn of_toml<T: DeserializeOwned>(text: &str) -> Result<T, SpecError> {
 }
 
 fn in_toml(text: &str, error: &toml::de::Error, path: &str) -> SpecError {
-    let location = error.span().map(|span| Location::find(text, span));
+    let span = error.span().or_else(|| span_of(text, path));
+    let location = span.map(|span| Location::find(text, span));
     refusal(error.message(), path).with_homes(tables_with).located(location)
 }
 
