@@ -1,22 +1,9 @@
 //! The predicted error of views against the measured one: on photographs, which are skipped with a note
 //! where the data are not there, and on scenes with exact references.
 
-#[path = "../support/bilinear.rs"]
-mod bilinear;
-mod decisions;
 mod place;
-#[path = "../../examples/plan/planner/mod.rs"]
-#[allow(dead_code, unreachable_pub, unused_imports)]
-mod planner;
-use trials::random;
-#[path = "../ray_traced/scene.rs"]
-#[allow(dead_code)]
-mod scene;
-mod sure;
-#[path = "../../examples/sure_bound/bound/mod.rs"]
-#[allow(unreachable_pub)]
-mod sure_bound;
 
+use crate::ray_traced::scene;
 use hybank_ibr::analysis::{Predictor, ViewError};
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
@@ -24,7 +11,7 @@ use hybank_ibr::image::{Image, MOST_PIXELS, read_image, read_map};
 use hybank_ibr::pipeline::RenderSettings;
 use hybank_ibr::propagate::{CalibratedView, RectifiedView};
 use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
-use random::Random;
+use trials::random::Random;
 
 /// Side of the blocks over which errors are ranked, in pixels.
 const BLOCK: usize = 16;
@@ -222,11 +209,14 @@ fn ray_traced(positions: &[f64]) -> Rig {
     Rig { images, maps: depths.iter().map(disparity).collect(), positions: positions.to_vec() }
 }
 
-fn synthetic(positions: &[f64]) -> Rig {
-    let size = (240, 180);
+fn plain(positions: &[f64]) -> Rig {
+    synthetic(&SyntheticScene::default(), positions, (240, 180))
+}
+
+fn synthetic(scene: &SyntheticScene, positions: &[f64], size: (usize, usize)) -> Rig {
     let shot = |position: &f64| {
         let camera = Camera::metric(rig_camera(*position, size), false).unwrap();
-        let (image, depth) = SyntheticScene::default().view(&camera, size);
+        let (image, depth) = scene.view(&camera, size);
         (image.quantised(), rig_disparity(&depth, size.0))
     };
     let (images, maps) = positions.iter().map(shot).unzip();
@@ -259,7 +249,7 @@ fn scenes_with_noise_and_coarse_disparities() {
     let positions = [0.0, 1.0, 0.5, 0.3];
     let cases = [(vec![0, 1], 3), (vec![0, 1], 2), (vec![0, 1, 2], 3)];
     let (scenes, cases) = if all { (2, &cases[..]) } else { (1, &cases[..1]) };
-    let rigs = [("synthetic", synthetic as fn(&[f64]) -> Rig), ("ray-traced", ray_traced)];
+    let rigs = [("synthetic", plain as fn(&[f64]) -> Rig), ("ray-traced", ray_traced)];
     for (name, make) in rigs.into_iter().take(scenes) {
         let exact = make(&positions);
         for (noise, step) in [(3.0, 0.25), (1.5, 1.0)] {
@@ -279,7 +269,7 @@ fn scenes_with_noise_and_coarse_disparities() {
 #[test]
 fn scenes_with_exact_inputs() {
     let positions = [0.0, 1.0, 0.5];
-    for (name, rig) in [("ray-traced", ray_traced(&positions)), ("synthetic", synthetic(&positions))] {
+    for (name, rig) in [("ray-traced", ray_traced(&positions)), ("synthetic", plain(&positions))] {
         let v = predict(name, &rig, &[0, 1], 0.5, &rig.images[2], 0.0);
         assert!((0.8..1.25).contains(&v.ratio), "{name}: {v:?}");
         assert!(v.local_limit > 0.99, "{name}: {v:?}");

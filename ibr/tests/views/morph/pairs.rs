@@ -1,6 +1,6 @@
 //! Pairs of photographs with tracks, and the view between them.
 
-use crate::normal::normal;
+use crate::support::normal::normal;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::DepthMap;
 use hybank_ibr::image::{Image, MOST_PIXELS, read_image, read_map};

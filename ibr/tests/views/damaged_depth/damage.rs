@@ -40,31 +40,6 @@ pub(crate) enum Damage {
 }
 
 impl Damage {
-    pub(crate) const ALL: [Self; 14] = [
-        Self::Clean,
-        Self::Outliers(0.05),
-        Self::Blobs(0.05),
-        Self::Flying,
-        Self::Noise(0.5),
-        Self::Noise(1.0),
-        Self::Scattered(0.03),
-        Self::ScatteredOutliers(0.03, 0.05),
-        Self::Lattice,
-        Self::Matched,
-        Self::Exposure([0.95; 3]),
-        Self::Exposure([0.965; 3]),
-        Self::Exposure([0.98; 3]),
-        Self::Exposure([0.9, 1.0, 1.1]),
-    ];
-    pub(crate) const OF_SKY: [Self; 6] = [
-        Self::Sky(f32::INFINITY),
-        Self::Sky(1e10),
-        Self::Sky(f32::NAN),
-        Self::Sky(0.0),
-        Self::Scattered(0.03),
-        Self::ScatteredSky(0.03),
-    ];
-
     pub(crate) fn name(self) -> String {
         match self {
             Self::Clean => "clean".into(),

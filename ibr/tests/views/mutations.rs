@@ -1,8 +1,6 @@
 //! Damaged input: every parser of ours gives a value or a message for thousands of seeded mutations, and
 //! never panics. `fuzz/` looks deeper with the same checks.
 
-use trials::random;
-
 use hybank_ibr::camera::CameraList;
 use hybank_ibr::camera::colmap::parse_model;
 use hybank_ibr::camera::middlebury::parse_calibration;
@@ -10,8 +8,8 @@ use hybank_ibr::camera::transforms::parse_transforms;
 use hybank_ibr::image::{Image, Levels, MOST_PIXELS, encode, pfm, read_image, read_map};
 use hybank_ibr::scene::parse;
 use hybank_ibr::uncalibrated::tracks::Tracks;
-use random::Random;
 use std::path::Path;
+use trials::random::Random;
 
 const ROUNDS: usize = 3000;
 

@@ -1,16 +1,13 @@
 //! Views without cameras beside a morph of 20 lines: of twelve pairs of photographs none may be worse.
 
-#[path = "../support/morph.rs"]
-mod morph;
-#[path = "../support/normal.rs"]
-mod normal;
 mod pairs;
+mod plain;
 
 use hybank_ibr::image::{Image, quality};
 use hybank_ibr::pipeline::RenderSettings;
 use hybank_ibr::pipeline::uncalibrated::{Target, UncalibratedSettings, render};
-use morph::{Corner, morph};
 use pairs::Pair;
+use plain::{Corner, morph};
 
 /// PSNR of the rendering over that of the morph, on the pixels that both show, in dB.
 fn gain(pair: &Pair) -> f64 {

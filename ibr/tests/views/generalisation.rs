@@ -2,21 +2,14 @@
 //! that the defaults were not chosen on. Each is compared with rounding every pixel to the nearest position
 //! and keeping the nearest sample.
 
-#[path = "support/bilinear.rs"]
-mod bilinear;
-#[path = "support/noise.rs"]
-mod noise;
-#[path = "support/normal.rs"]
-mod normal;
-
-use bilinear::bilinear;
+use crate::support::bilinear::bilinear;
+use crate::support::noise::noisy;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, MOST_PIXELS, quality, read_image, read_map};
 use hybank_ibr::interpolate::Cover;
 use hybank_ibr::partial::densify;
 use hybank_ibr::pipeline::{Method, RenderSettings, rectified};
 use hybank_ibr::propagate::RectifiedView;
-use noise::noisy;
 
 const WIDTH: usize = 200;
 const HEIGHT: usize = 120;

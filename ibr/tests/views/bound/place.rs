@@ -67,8 +67,7 @@ fn predicted_and_true_errors_rank_sets_of_views_alike() {
         let mut random = Random(seed + 1);
         let mut positions: Vec<f64> = (0..8).map(|_| 4.0 * random.part() - 1.5).collect();
         positions.push(0.5);
-        let rig =
-            degraded(&decisions::small(&SyntheticScene::varied(seed), &positions, (160, 120)), 1.5, 0.25);
+        let rig = degraded(&synthetic(&SyntheticScene::varied(seed), &positions, (160, 120)), 1.5, 0.25);
         let found = examined(&rig, 3);
         println!(
             "scene {seed}: rank correlation {:.3}, error of the choice / least {:.3}, of the mean set {:.3}",

@@ -1,17 +1,8 @@
-//! Views from damaged depth: the figures of the example `damaged_depth`. Skipped, with a note, where the
-//! data are not there.
+//! Views from damaged depth: scenes with true views, whose maps are damaged by a seeded generator. Skipped,
+//! with a note, where the data are not there.
 
-#[path = "../examples/damaged_depth/case.rs"]
-// Parts of these are used by the example only.
-#[allow(dead_code)]
 mod case;
-#[path = "../examples/damaged_depth/damage.rs"]
-#[allow(dead_code)]
 mod damage;
-#[path = "../examples/damaged_depth/peers/mod.rs"]
-#[allow(dead_code)]
-mod peers;
-#[path = "../examples/damaged_depth/sky.rs"]
 mod sky;
 
 use case::Case;
@@ -101,7 +92,7 @@ fn a_thin_grid_is_kept() {
 fn a_sky_is_far_away() {
     let folder = tempfile::tempdir().unwrap();
     let (path, truth) = sky::write(folder.path()).unwrap();
-    let case = Case::read("sky", &path, &truth).unwrap();
+    let case = Case::read(&path, &truth).unwrap();
     let of = |value: f32| case.rendered(Damage::Sky(value), folder.path()).unwrap();
     let (far, number, unknown, zero) = (of(f32::INFINITY), of(1e10), of(f32::NAN), of(0.0));
     assert!(far.psnr > 34.5 && far.coverage > 0.97, "{} {}", far.psnr, far.coverage);

@@ -1,13 +1,8 @@
 //! Figures on photographs: skipped, with a note, where the data are not there.
 
-#[path = "support/bilinear.rs"]
-mod bilinear;
-#[path = "support/noise.rs"]
-mod noise;
-#[path = "support/normal.rs"]
-mod normal;
-
-use bilinear::bilinear;
+use crate::support::bilinear::bilinear;
+use crate::support::noise::noisy;
+use crate::support::normal::normal;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, MOST_PIXELS, quality, read_image, read_map};
 use hybank_ibr::interpolate::plane::PlaneSettings;
@@ -17,8 +12,6 @@ use hybank_ibr::pipeline::{Agreement, Method, RenderSettings, rectified, uncalib
 use hybank_ibr::propagate::RectifiedView;
 use hybank_ibr::restore::restore;
 use hybank_ibr::uncalibrated::Point;
-use noise::noisy;
-use normal::normal;
 use std::path::{Path, PathBuf};
 
 /// The data folder, or `None` with a printed note.

@@ -1,6 +1,6 @@
 //! Photographs with noise.
 
-use crate::normal::normal;
+use super::normal::normal;
 use hybank_ibr::image::Image;
 
 /// The image with white noise of this standard deviation.

@@ -1,9 +1,8 @@
 //! Renderings of a ray-traced scene with exact depth: cameras that move sideways and forward and that zoom.
 
-#[path = "../support/normal.rs"]
-mod normal;
-mod scene;
+pub(crate) mod scene;
 
+use crate::support::normal::normal;
 use hybank_ibr::depth::{DepthMap, Measure};
 use hybank_ibr::image::{Image, quality};
 use hybank_ibr::interpolate::plane::PlaneSettings;
@@ -58,7 +57,7 @@ fn a_stereo_pair_gives_the_view_between() {
 fn samples_with_errors_of_depth_count_less() {
     for (deviation, nearer, least) in [(0.01, 0.0, 44.6), (0.02, 0.0, 44.0), (0.02, 1.0, 38.2)] {
         let mut pair = shots(&[eye(-0.2, 0.0, 0.0), eye(0.2, 0.0, 0.0)]);
-        let mut normal = normal::normal(4);
+        let mut normal = normal(4);
         let values = pair[1].depth.data().iter().map(|d| d * (1.0 + deviation * normal()) as f32);
         pair[1].depth = DepthMap::new(SIZE, values.collect(), 1.0, Measure::Depth).unwrap();
         let got = psnr(&pair, &eye(0.0, 0.0, nearer), &format!("errors {deviation}, {nearer} nearer"));
