@@ -194,19 +194,3 @@ fn a_narrow_accumulator_wraps() {
     let needed = number(&report, "/needed_accumulator_bits") as u32;
     assert!(largest << 15 <= 1 << (needed - 1) && largest << 15 > 1 << (needed - 2), "{needed}: {largest}");
 }
-
-#[test]
-fn what_has_no_integers_is_refused() {
-    let desk = Desk::with_spec(THESIS);
-    desk.good(&["design", "spec.toml", "-o", "b.json"]);
-    captures(&desk, 16);
-    desk.refused(1, &FUSE, &["b.json", "method = \"fir\" and bits"]);
-    desk.good(&["design", "spec.toml", "-o", "b.json", "--bits", "12", "--force"]);
-    desk.good(&["simulate", "b.json", "--source", "tones:0.3", "--samples", "100", "-o", "cap"]);
-    let floats = ["fuse", "b.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "x.wav", "--bit-true"];
-    desk.refused(1, &floats, &["cap/ch1.wav", "f32le", "16, 24 or 32 bits"]);
-    desk.refused(2, &[&FUSE[..], &["--bits", "16"]].concat(), &["--bit-true", "--bits"]);
-    let words = ["export", "b.json", "--format", "csv", "-o", "x.csv", "--input-bits", "12"];
-    desk.refused(1, &words, &["only the integer code", "leave out --input-bits"]);
-    desk.refused(2, &["fuse", "b.json", "in.wav", "-o", "x.wav", "--accumulator", "40"], &["--bit-true"]);
-}

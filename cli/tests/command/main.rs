@@ -22,7 +22,6 @@ mod export;
 mod faults;
 mod formats;
 mod fuse;
-mod impossible;
 #[cfg(target_os = "linux")]
 mod interrupts;
 #[cfg(unix)]
