@@ -17,7 +17,6 @@ mod integer_taps;
 mod latency;
 mod near_instants;
 mod nearly_equal_delays;
-mod random_plants;
 mod rates;
 mod reduction;
 mod repeated_channels;

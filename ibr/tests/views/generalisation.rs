@@ -4,9 +4,8 @@
 
 use crate::support::bilinear::bilinear;
 use crate::support::noise::noisy;
-use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
-use hybank_ibr::image::{Image, MOST_PIXELS, quality, read_image, read_map};
-use hybank_ibr::interpolate::Cover;
+use hybank_ibr::depth::{DepthMap, Measure};
+use hybank_ibr::image::{Image, quality};
 use hybank_ibr::partial::densify;
 use hybank_ibr::pipeline::{Method, RenderSettings, rectified};
 use hybank_ibr::propagate::RectifiedView;
@@ -238,38 +237,5 @@ fn every_kind_of_scene_profits_from_the_image_where_depth_is_coarse() {
         println!("{name}, depth at one pixel in 36: spline {spline:.2}, bilinear {bilinear:.2} dB");
         // On one plane both are exact; across edges the spline must win.
         assert!(spline > bilinear - 0.1, "{name}: {spline} {bilinear}");
-    }
-}
-
-/// Teddy has no picture between its views: each view is rendered from the other one alone. Skipped, with a
-/// note, where the data are not there.
-#[test]
-fn teddy_from_one_view() {
-    let Some(path) = trials::data("ibr/teddy") else { return };
-    let load = |image: &str, map: &str| {
-        let (width, height, stored) = read_map(&path.join(map), MOST_PIXELS).unwrap();
-        let mut map = DepthMap::new((width, height), stored, 4.0, Measure::Disparity).unwrap();
-        fill_unknown(&mut map);
-        (read_image(&path.join(image), MOST_PIXELS).unwrap(), map)
-    };
-    let ends = [load("im2.png", "disp2.png"), load("im6.png", "disp6.png")];
-    for (from, to) in [(0, 1), (1, 0)] {
-        let view = RectifiedView { image: &ends[from].0, map: &ends[from].1, camera: from as f64 };
-        let truth = &ends[to].0;
-        let done = rectified::render(&[view], to as f64, &RenderSettings::default()).unwrap();
-        let seen: Vec<bool> = done.mask.iter().map(|c| *c == Cover::Seen).collect();
-        let baseline = rounded(&[view], to as f64);
-        let figures = [psnr(&done.image, truth, Some(&seen)), psnr(&baseline, truth, Some(&seen))];
-        let whole = [psnr(&done.image, truth, None), psnr(&baseline, truth, None)];
-        let copy = psnr(view.image, truth, None);
-        println!(
-            "teddy {from} -> {to}: {:.2} dB on the {:.1} % seen (rounded {:.2}), whole {:.2} (rounded {:.2}, copy {copy:.2})",
-            figures[0],
-            100.0 * done.coverage(),
-            figures[1],
-            whole[0],
-            whole[1]
-        );
-        assert!(figures[0] > figures[1] && whole[0] > whole[1] && whole[0] > copy + 5.0);
     }
 }

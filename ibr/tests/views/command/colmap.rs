@@ -209,25 +209,3 @@ fn a_size_of_the_same_shape_scales_the_virtual_camera() {
     // The fit at the lower border of the window knows nothing of what is below.
     assert!((0..3 * 120 * 45).all(|i| difference(i) <= 2.0));
 }
-
-/// Folders around the model, names that it does not have, and formats that were changed.
-#[test]
-fn messages_lead_to_the_model_and_its_names() {
-    let dir = folder(FLAT);
-    let at = |name: &str| dir.path().join(name);
-    std::fs::create_dir_all(at("cm/sparse")).unwrap();
-    std::fs::rename(at("model"), at("cm/sparse/0")).unwrap();
-    let render = ["render", "s.toml", "--view", "c.png", "-o", "x.png"];
-    replace(dir.path(), "\"model\"", "\"cm\"");
-    refused(dir.path(), &render, 1, &["cameras.txt", "name the folder with the model: cm/sparse/0"]);
-    replace(dir.path(), "\"cm\"", "\"cm/sparse/0/cameras.txt\"");
-    refused(dir.path(), &render, 1, &["it is a file; name the folder"]);
-    replace(dir.path(), "cm/sparse/0/cameras.txt", "nowhere");
-    refused(dir.path(), &render, 1, &["no such folder", "relative to the scene file"]);
-    replace(dir.path(), "nowhere", "cm/sparse/0");
-    std::fs::write(at("cm/sparse/0/images.txt"), images(["d.png", "e.png", "f.png"])).unwrap();
-    refused(dir.path(), &render, 1, &["view \"photos/a.png\"", "no image", "d.png, e.png, f.png"]);
-    // A photograph that was converted after the reconstruction keeps its camera.
-    std::fs::write(at("cm/sparse/0/images.txt"), images(["a.jpg", "b.jpg", "c.jpg"])).unwrap();
-    assert!(psnr(dir.path(), &["--view", "c.png", "--truth", "photos/c.png"]) > 31.0);
-}

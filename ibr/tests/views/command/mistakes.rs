@@ -110,22 +110,6 @@ fn a_choice_of_views_that_is_none_is_named() {
     refused(dir.path(), &render, 2, &["--nearest 1", "cameras of this scene are unknown"]);
 }
 
-/// Names of files that no encoder here writes are wrong usage, and films have a way.
-#[test]
-fn formats_are_refused_as_usage_with_the_way_to_a_film() {
-    let dir = rig();
-    write(dir.path(), "path.toml", &(scene(dir.path()) + "to_position = 1.0\nframes = 2\n"));
-    let film = ["film.y4m", "-o - | ffmpeg -i - film.mp4"];
-    refused(dir.path(), &["render", "path.toml", "-o", "film.mp4"], 2, &film);
-    refused(dir.path(), &["render", "scene.toml", "-o", "film.MKV"], 2, &["film.y4m", "ffmpeg"]);
-    for name in ["v.exr", "v.tiff", "v"] {
-        refused(dir.path(), &["render", "scene.toml", "-o", name], 2, &[name, "use .png"]);
-    }
-    let mask = ["render", "scene.toml", "-o", "a.png", "--mask", "m.tiff"];
-    refused(dir.path(), &mask, 2, &["m.tiff", "use .png"]);
-    refused(dir.path(), &["render", "scene.toml", "-o", "a.jpg", "--bits", "16"], 2, &["16 bits"]);
-}
-
 /// Rates of films as ratios.
 #[test]
 fn films_have_the_rates_of_television() {
@@ -223,14 +207,6 @@ fn the_scale_of_all_maps_is_one_line() {
     );
 }
 
-/// "cannot recurse further; max recursion depth met".
-#[test]
-fn nesting_is_refused_in_plain_words() {
-    let dir = transforms();
-    write(dir.path(), "s.toml", &format!("[virtual]\nx = {}{}\n", "[".repeat(200), "]".repeat(200)));
-    refused(dir.path(), &["render", "s.toml", "-o", "x.png"], 1, &["s.toml:2:", "nested too deeply"]);
-}
-
 /// Without `[virtual]` the message names the key to write; a frame without depth is a place too.
 #[test]
 fn transforms_without_a_virtual_view_say_which_key_is_missing() {
@@ -247,31 +223,4 @@ fn transforms_without_a_virtual_view_say_which_key_is_missing() {
     let target = ["render", "s.toml", "--view", "2.png", "-o", "x.png"];
     refused(dir.path(), &target, 1, &["d0.png", "120 x 90", "60 x 90"]);
     assert_eq!(read_image(&dir.path().join("o.png"), MOST_PIXELS).unwrap().size(), SIZE);
-}
-
-/// A negative number was taken for an option, with the advice to write `-- -1`.
-#[test]
-fn negative_values_are_refused_by_their_rule() {
-    let dir = rig();
-    for (option, value) in [("--depth-step", "-1"), ("--max-pixels", "-1"), ("--threads", "-2")] {
-        let output = run(dir.path(), &["render", "scene.toml", "-o", "o.png", option, value]);
-        let said = stderr(&output);
-        assert!(code(&output) == 2 && said.contains(option) && said.contains("whole number"), "{said}");
-        assert!(!said.contains("tip:"), "{said}");
-    }
-}
-
-/// The view was computed before its name was looked at.
-#[test]
-fn an_output_that_cannot_be_is_refused_before_the_scene_is_read() {
-    let dir = rig();
-    write(dir.path(), "no.toml", "no scene");
-    for command in [["render", "no.toml", "-o"], ["bound", "no.toml", "--map"]] {
-        refused(
-            dir.path(),
-            &[&command[..], &["none/o.png"]].concat(),
-            1,
-            &["none/o.png", "its folder is not there"],
-        );
-    }
 }

@@ -3,36 +3,6 @@
 use super::*;
 use hybank_ibr::image::Image;
 
-#[test]
-fn wrong_input_has_one_clear_message() {
-    let dir = rig();
-    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
-    save(&Image::filled(30, 20, 3, 9.0), &dir.path().join("small.png")).unwrap();
-    let nan = Image::filled(120, 90, 1, f32::NAN);
-    std::fs::write(dir.path().join("nan.pfm"), pfm::encode(&nan)).unwrap();
-    for (from, to, words) in [
-        ("left.png", "nowhere.png", &["nowhere.png"][..]),
-        ("left.png", "small.png", &["30 x 20", "120 x 90"]),
-        ("left.pfm", "nan.pfm", &["nan.pfm", "none of the 10800 values"]),
-        ("position = 0.5", "position = 5000.0", &["no sample lies in the virtual image"]),
-        ("disparity =", "disparty =", &["broken.toml:5:1: unknown key \"disparty\"", "the keys here are"]),
-        ("position = 0.5", "", &["[virtual] needs a `position`"]),
-        ("image = \"left.png\"", "image = 7", &["broken.toml:3:9: expected the name of a file, found 7"]),
-    ] {
-        std::fs::write(dir.path().join("broken.toml"), scene.replace(from, to)).unwrap();
-        let refused = run(dir.path(), &["render", "broken.toml", "-o", "o.png"]);
-        let message = stderr(&refused);
-        assert_eq!(code(&refused), 1, "{to}: {message}");
-        assert!(refused.stdout.is_empty());
-        assert!(words.iter().all(|w| message.contains(w)), "{to}: {message}");
-        assert!(!message.contains("panicked") && !dir.path().join("o.png").exists());
-    }
-    let truth = run(dir.path(), &["render", "scene.toml", "-o", "o.png", "--truth", "small.png"]);
-    assert_eq!(code(&truth), 1);
-    assert!(stderr(&truth).contains("small.png") && stderr(&truth).contains("30 x 20"), "{}", stderr(&truth));
-    assert!(!dir.path().join("o.png").exists());
-}
-
 /// Contradictions, numbers out of range and files that are no files: exit code 1 and one message with the
 /// words.
 #[test]

@@ -3,12 +3,10 @@
 use crate::support::normal::normal;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::DepthMap;
-use hybank_ibr::image::{Image, MOST_PIXELS, read_image, read_map};
-use hybank_ibr::scene::{self, Kind, LoadOptions};
+use hybank_ibr::image::Image;
 use hybank_ibr::synthetic::SyntheticScene;
 use hybank_ibr::uncalibrated::Point;
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, Vector3};
-use std::path::{Path, PathBuf};
 
 /// Standard deviation of the positions of tracks that are made, in pixels.
 const NOISE: f64 = 0.25;
@@ -21,73 +19,9 @@ pub(crate) struct Pair {
     pub(crate) truth: Image,
 }
 
-/// The pairs whose photographs are there; the tests' list of what was skipped has the others.
-pub(crate) fn of_data() -> impl Iterator<Item = Pair> {
-    let path = |folder: &str| trials::data(&format!("ibr/{folder}"));
-    let houses = [([2, 4], 3), ([1, 3], 2), ([0, 2], 1), ([0, 3], 1), ([1, 4], 2), ([0, 4], 2)];
-    let house = path("model_house").into_iter();
-    let houses = house.flat_map(move |path| houses.map(|(from, wanted)| house_pair(&path, from, wanted)));
-    let rigs = [("cones", 4.0), ("poster1", 8.0)].into_iter();
-    let rigs = rigs.filter_map(move |(name, scale)| Some(rig(&path(name)?, scale)));
-    houses
-        .chain(rigs)
-        .chain(["spheres", "grid"].into_iter().filter_map(move |name| Some(traced(&path(name)?))))
-}
-
-fn name(path: &Path) -> String {
-    path.file_name().unwrap().to_string_lossy().into_owned()
-}
-
-/// Photographs of Model House, with the tracks that belong to them.
-fn house_pair(path: &Path, from: [usize; 2], wanted: usize) -> Pair {
-    let views = [from[0], from[1], wanted];
-    let text = |name: String| std::fs::read_to_string(path.join(name)).unwrap();
-    let point = |line: &str| {
-        let numbers: Vec<f64> = line.split_whitespace().map(|word| word.parse().unwrap()).collect();
-        Point::new(numbers[0], numbers[1])
-    };
-    let corners = views.map(|v| text(format!("house.{v:03}.corners")).lines().map(point).collect::<Vec<_>>());
-    let all = text("house.nview-corners".into());
-    let column = |k: usize| {
-        let number = |line: &str| line.split_whitespace().nth(views[k]).unwrap().parse::<usize>().ok();
-        all.lines().map(|line| Some(corners[k][number(line)?])).collect::<Vec<_>>()
-    };
-    let tracks = column(0).into_iter().zip(column(1)).map(|(a, b)| vec![a, b]).collect();
-    let image = |v: usize| read_image(&path.join(format!("house.{v:03}.png")), MOST_PIXELS).unwrap();
-    let images = from.map(image).to_vec();
-    Pair { name: format!("house {from:?} {wanted}"), images, tracks, target: column(2), truth: image(wanted) }
-}
-
 /// Pixels of an image in a sequence that covers it evenly.
 fn scattered((width, height): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
     (1..200_000).map(move |k| ((k * 7919) % width, (k * 104_729 / 7) % height))
-}
-
-/// A rectified rig of Middlebury: 500 tracks where both maps agree.
-fn rig(path: &Path, scale: f32) -> Pair {
-    let (width, height, left) = read_map(&path.join("disp2.png"), MOST_PIXELS).unwrap();
-    let (_, _, right) = read_map(&path.join("disp6.png"), MOST_PIXELS).unwrap();
-    let seen = |(x, y): (usize, usize)| {
-        let d = left[y * width + x] / scale;
-        let there = x as f32 - d;
-        let agrees = d > 0.0 && there >= 0.0;
-        let other = right[y * width + if agrees { there.round() as usize } else { 0 }] / scale;
-        let at = |shift: f32| Point::new(f64::from(x as f32 - shift), y as f64);
-        (agrees && (d - other).abs() <= 0.6).then(|| [at(0.0), at(d), at(d / 2.0)])
-    };
-    let image = |name: &str| read_image(&path.join(name), MOST_PIXELS).unwrap();
-    let points = scattered((width, height)).filter_map(seen).take(500).collect();
-    noisy(&name(path), vec![image("im2.png"), image("im6.png")], points, image("im4.png"))
-}
-
-/// A scene of general cameras: 400 tracks.
-fn traced(path: &Path) -> Pair {
-    let file: PathBuf = path.join("scene.toml");
-    let spec = scene::parse(&std::fs::read_to_string(&file).unwrap(), &file).unwrap();
-    let loaded = scene::load(&spec, &file, &LoadOptions::default(), &|_| ()).unwrap();
-    let Kind::Calibrated { views, cameras, .. } = loaded.kind else { panic!("{}", file.display()) };
-    let shots = views.into_iter().map(|v| Shot { image: v.image, map: v.map, camera: v.camera }).collect();
-    of_shots(&name(path), shots, &cameras[0], read_image(&path.join("truth.png"), MOST_PIXELS).unwrap(), 400)
 }
 
 /// Photographs of a synthetic scene: 250 tracks.
