@@ -39,7 +39,6 @@ mod rates;
 mod report;
 mod schema;
 mod simulate;
-mod snapshots;
 #[cfg(unix)]
 mod stream;
 mod understanding;

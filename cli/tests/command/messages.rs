@@ -146,15 +146,3 @@ fn a_file_is_no_folder_for_captures() {
         assert!(!said.contains("os error"), "{said}");
     }
 }
-
-#[test]
-fn names_that_no_output_can_have_are_refused_first() {
-    let desk = Desk::new();
-    desk.write("file", "");
-    desk.refused(
-        1,
-        &["plot", "none.json", "-o", "file/pictures"],
-        &["file/pictures", "the name of a folder"],
-    );
-    desk.refused(2, &["report", "bank.json", "-o", "report.pdf"], &["report.pdf", ".html"]);
-}

@@ -1,6 +1,5 @@
 //! Exported Verilog in the hands of Icarus Verilog, Verilator and Yosys, as far as they are there.
 
-use crate::support::random::Random;
 use crate::support::{Desk, number, text};
 use hybank::bank::{Bank, FixedPoint, SynthesisFilters};
 use hybank::spec::WordLengths;
@@ -276,49 +275,6 @@ fn a_small_circuit_is_proven() {
         );
         let Some((is_good, said)) = tool(&desk, &["yosys", "-q", "-p", &script]) else { return };
         assert!(is_good, "{flags}: {said}");
-    }
-}
-
-/// N and M of 1 to 8, 2 to 64 taps of 4 to 18 bits, 1, 2, 4 and 8 clocks, a million frames, compiled.
-#[test]
-fn random_banks_have_no_differing_bit_in_a_million_frames() {
-    if !trials::is_slow("a million frames of random banks in Verilator") {
-        return;
-    }
-    for seed in trials::trials(20) {
-        let mut random = Random(seed + 1);
-        let (n, ratio, taps) = (random.count(1, 8), random.count(1, 8), random.count(2, 64));
-        let bits = random.count(4, 18) as u32;
-        let most = 1_i64 << (bits - 1);
-        let tap = |random: &mut Random| random.below(2 * most as usize) as i64 - most;
-        let integers = (0..n).map(|_| (0..taps).map(|_| tap(&mut random)).collect()).collect();
-        let desk = Desk::empty();
-        let fraction_bits = random.count(0, bits as usize + 3) as i32;
-        write_bank(&desk, integers, bits, fraction_bits, ratio);
-        let clocks = ["1", "2", "4", "8"][seed as usize % 4];
-        let input = random.count(4, 16).to_string();
-        let pipeline = random.count(1, 3).to_string();
-        let flags = ["--input-bits", &input, "--clocks-per-frame", clocks];
-        let more = ["--pipeline", &pipeline, "--random-frames", "1000000"];
-        let report = exported(&desk, &[&flags[..], &more].concat());
-        let line = [
-            "verilator",
-            "--binary",
-            "--timing",
-            "-Wno-fatal",
-            "-O3",
-            "--top-module",
-            "core_tb",
-            "core.v",
-            "core_tb.v",
-        ];
-        let Some((is_good, said)) = tool(&desk, &line) else { return };
-        assert!(is_good, "{seed}: {said}");
-        let program = desk.path("obj_dir/Vcore_tb");
-        let output = Command::new(program).current_dir(desk.path("")).output().unwrap();
-        let said = text(&output.stdout);
-        println!("{seed}: N {n}, M {ratio}, {taps} taps of {bits} bits, C {clocks}: {report}");
-        assert!(said.contains("PASS") && !said.contains("FAIL"), "{seed} {flags:?} {report}: {said}");
     }
 }
 

@@ -1,12 +1,9 @@
 //! Figures on photographs: skipped, with a note, where the data are not there.
 
-use crate::support::bilinear::bilinear;
 use crate::support::noise::noisy;
 use crate::support::normal::normal;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, MOST_PIXELS, quality, read_image, read_map};
-use hybank_ibr::interpolate::plane::PlaneSettings;
-use hybank_ibr::partial::densify;
 use hybank_ibr::pipeline::uncalibrated::{Target, UncalibratedRendering, UncalibratedSettings};
 use hybank_ibr::pipeline::{Agreement, Method, RenderSettings, rectified, uncalibrated};
 use hybank_ibr::propagate::RectifiedView;
@@ -63,20 +60,6 @@ fn cones_full_depth() {
     assert!(psnr(&pair, &RenderSettings { method: Method::Plane, ..settings }) >= 28.8);
 }
 
-/// The plane against itself with bilinear splines, between the photographs and at one of their places.
-#[test]
-fn a_bicubic_plane_is_sharper() {
-    let Some(pair) = pair("cones") else { return };
-    let settings = RenderSettings { method: Method::Plane, offset: 0.25, ..RenderSettings::default() };
-    let mut bilinear = settings;
-    bilinear.interpolation.plane = PlaneSettings::LINEAR;
-    let [cubic, linear] = [settings, bilinear].map(|settings| psnr(&pair, &settings));
-    assert!(cubic >= linear + 0.25 && cubic >= 30.2, "{linear} {cubic}");
-    let own = rectified::render(&views(&pair), 0.0, &RenderSettings { offset: 0.0, ..settings }).unwrap();
-    let own = quality::compare(&own.image, &pair.images[0], None).unwrap().unwrap().psnr;
-    assert!(own >= 41.0, "{own}");
-}
-
 /// At the place of a photograph that photograph counts most; equal weights gave 33.4 dB.
 #[test]
 fn at_a_photographs_own_place() {
@@ -130,40 +113,6 @@ fn errors_of_depth_are_measured_and_smoothed() {
     }
 }
 
-/// One view brighter by a factor of 1.12: without a match of the exposures this costs 2 dB.
-#[test]
-fn exposures_are_matched() {
-    let Some(mut pair) = pair("cones") else { return };
-    let right = psnr(&pair, &RenderSettings::default());
-    pair.images[1].data_mut().iter_mut().for_each(|v| *v = (*v * 1.12).min(255.0));
-    let matched = psnr(&pair, &RenderSettings::default());
-    let kept = psnr(&pair, &RenderSettings { keep_exposure: true, ..RenderSettings::default() });
-    assert!(matched >= right - 0.5 && matched >= kept + 1.0, "{right} {matched} {kept}");
-}
-
-/// The figures of the check of the inputs on photographs: right, swapped, and with the scale forgotten.
-#[test]
-fn wrong_inputs_show() {
-    for folder in ["cones", "teddy"] {
-        let Some(pair) = pair(folder) else { return };
-        let maps = |factor: f32| {
-            pair.maps.each_ref().map(|m| {
-                let values = m.data().iter().map(|v| factor * v).collect();
-                DepthMap::new(m.size(), values, 1.0, Measure::Disparity).unwrap()
-            })
-        };
-        let share = |positions: [f64; 2], factor: f32| {
-            let maps = maps(factor);
-            let view =
-                |i: usize| RectifiedView { image: &pair.images[i], map: &maps[i], camera: positions[i] };
-            Agreement::of(&[view(0), view(1)]).worst().unwrap().share
-        };
-        let shares = [share([0.0, 1.0], 1.0), share([1.0, 0.0], 1.0), share([0.0, 1.0], 4.0)];
-        println!("{folder}: right, swapped, unscaled {shares:.2?}");
-        assert!(shares[0] > 0.85 && shares[1] < 0.3 && shares[2] < 0.2, "{shares:?}");
-    }
-}
-
 /// Each view from the other one alone. Filling the plane's border holes with the farthest of four neighbours
 /// gave 22.7 dB where rows gave 25.7.
 #[test]
@@ -179,29 +128,6 @@ fn single_views() {
             assert!(psnr >= least, "{method:?} {place}: {psnr}");
         }
     }
-}
-
-#[test]
-fn cones_with_three_percent_of_the_depths() {
-    let Some(path) = data("cones") else { return };
-    let dense = |is_spline: bool| {
-        let mut whole = pair("cones").unwrap();
-        for (i, name) in ["disp2.png", "disp6.png"].iter().enumerate() {
-            let (width, height, stored) = read_map(&path.join(name), MOST_PIXELS).unwrap();
-            let map = DepthMap::new((width, height), stored, 4.0, Measure::Disparity).unwrap();
-            let start = std::time::Instant::now();
-            let (coarse, image) = (map.decimated(6).unwrap(), &whole.images[i]);
-            whole.maps[i] = match is_spline {
-                true => densify(&coarse, 6, image).unwrap(),
-                false => bilinear(&coarse, 6, image),
-            };
-            println!("densified in {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
-        }
-        psnr(&whole, &RenderSettings::default())
-    };
-    let (spline, bilinear) = (dense(true), dense(false));
-    assert!(spline >= 28.7, "{spline}");
-    assert!(spline >= bilinear + 1.8, "{bilinear}");
 }
 
 /// Tracks of the Model House over some views: the corner files and the table of their indices.

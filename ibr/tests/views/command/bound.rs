@@ -36,25 +36,6 @@ fn worse_inputs_are_predicted_to_be_worse() {
     assert!(text.contains("typical photographs") && text.contains("causes    density"), "{text}");
 }
 
-#[test]
-fn what_cannot_be_predicted_is_refused() {
-    let dir = rig();
-    let scene = "matches = \"t.txt\"\n[[view]]\nname = \"a\"\nimage = \"left.png\"\n[[view]]\nname = \"b\"\nimage = \"right.png\"\n[virtual]\nbetween = 0.5\n";
-    std::fs::write(dir.path().join("free.toml"), scene).unwrap();
-    let lines: String = (0..20).map(|i| format!("{} {} {} {}\n", 5 * i, 4 * i, 5 * i + 1, 4 * i)).collect();
-    std::fs::write(dir.path().join("t.txt"), lines).unwrap();
-    let refused = run(dir.path(), &["bound", "free.toml"]);
-    assert!(
-        code(&refused) == 1 && stderr(&refused).contains("the cameras of this scene are unknown"),
-        "{}",
-        stderr(&refused)
-    );
-    let usage = run(dir.path(), &["bound", "scene.toml", "--map", "-"]);
-    assert_eq!(code(&usage), 2);
-    let over = run(dir.path(), &["bound", "scene.toml", "--map", "left.png", "--force"]);
-    assert!(code(&over) == 1 && dir.path().join("left.png").is_file(), "{}", stderr(&over));
-}
-
 /// Float maps hold grey levels: limit, expected error and estimate, whose means are the totals.
 #[test]
 fn a_float_map_holds_the_numbers() {

@@ -210,53 +210,6 @@ fn transforms_files_give_the_views() {
     refused(dir.path(), &["render", "s.toml", "-o", "x.png"], 1, &["frame 1", "depth_file_path", "[[view]]"]);
 }
 
-/// A folder of the Middlebury benchmark: calib.txt alone names the pair, and its doffs is the offset.
-#[test]
-fn middlebury_folders_are_scenes() {
-    let dir = rig();
-    let at = |name: &str| dir.path().join(name);
-    for (from, to) in [("left.png", "im0.png"), ("right.png", "im1.png")] {
-        std::fs::copy(at(from), at(to)).unwrap();
-    }
-    for (from, to) in [("left.pfm", "disp0.pfm"), ("right.pfm", "disp1.pfm")] {
-        std::fs::copy(at(from), at(to)).unwrap();
-    }
-    let calib = |offset: f64, width: usize| {
-        let right = 59.5 + offset;
-        let text = format!(
-            "cam0=[108 0 59.5; 0 108 44.5; 0 0 1]\ncam1=[108 0 {right}; 0 108 44.5; 0 0 1]\ndoffs={offset}\nbaseline=100\nwidth={width}\nheight=90\nndisp=60\n"
-        );
-        std::fs::write(at("calib.txt"), text).unwrap();
-    };
-    std::fs::write(at("m.toml"), "calib = \"calib.txt\"\n[virtual]\nposition = 0.5\n").unwrap();
-    calib(0.0, 120);
-    good(dir.path(), &["render", "m.toml", "-o", "m.png"]);
-    good(dir.path(), &["render", "scene.toml", "-o", "s.png"]);
-    let same = |a: &str, b: &str| std::fs::read(at(a)).unwrap() == std::fs::read(at(b)).unwrap();
-    assert!(same("m.png", "s.png"));
-    // The offset of the file is the one that the key gives.
-    calib(12.5, 120);
-    let scene = std::fs::read_to_string(at("scene.toml")).unwrap();
-    let keyed = scene.replace("disparity =", "disparity_offset = 12.5\ndisparity =");
-    std::fs::write(at("k.toml"), &keyed).unwrap();
-    good(dir.path(), &["render", "m.toml", "-o", "m.png", "--force"]);
-    good(dir.path(), &["render", "k.toml", "-o", "k.png"]);
-    assert!(same("m.png", "k.png"));
-    std::fs::write(at("two.toml"), "calib = \"calib.txt\"\n".to_string() + &keyed.replace("12.5", "7.0"))
-        .unwrap();
-    refused(dir.path(), &["render", "two.toml", "-o", "x.png"], 1, &["disparity_offset = 7", "12.5"]);
-    calib(12.5, 240);
-    refused(
-        dir.path(),
-        &["render", "m.toml", "-o", "x.png"],
-        1,
-        &["240 x 90", "120 x 90", "disparity_offset"],
-    );
-    std::fs::write(at("calib.txt"), "doffs=1\n").unwrap();
-    refused(dir.path(), &["render", "m.toml", "-o", "x.png"], 1, &["calib.txt", "`cam0` is missing"]);
-    refused(dir.path(), &["render", "m.toml", "-o", "calib.txt.png", "--count", "-"], 2, &["--count -"]);
-}
-
 /// A view alone cannot contradict another: the report says that its inputs are unchecked.
 #[test]
 fn the_inputs_of_a_single_view_are_reported_as_unchecked() {

@@ -94,36 +94,6 @@ fn warnings_are_about_all_views_of_a_path() {
     assert_eq!(message.matches("agree in depth and colour at only").count(), 1, "{message}");
 }
 
-/// `--nearest` where it cannot choose.
-#[test]
-fn a_choice_of_views_that_is_none_is_named() {
-    let dir = rig();
-    let done = good(dir.path(), &["render", "scene.toml", "-o", "a.png", "--nearest", "9"]);
-    assert!(stderr(&done).contains("--nearest 9: there are 2 views"), "{}", stderr(&done));
-    let two = good(dir.path(), &["render", "scene.toml", "-o", "b.png", "--nearest", "2"]);
-    assert!(two.stderr.is_empty(), "{}", stderr(&two));
-    let views = "[[view]]\nimage = \"left.png\"\n[[view]]\nimage = \"right.png\"\n";
-    write(dir.path(), "free.toml", &format!("matches = \"t.txt\"\n{views}[virtual]\nbetween = 0.5\n"));
-    let tracks: String = (0..20).map(|i| format!("{} {} {} {}\n", 5 * i, 4 * i, 5 * i + 1, 4 * i)).collect();
-    write(dir.path(), "t.txt", &tracks);
-    let render = ["render", "free.toml", "-o", "x.png", "--nearest", "1"];
-    refused(dir.path(), &render, 2, &["--nearest 1", "cameras of this scene are unknown"]);
-}
-
-/// Rates of films as ratios.
-#[test]
-fn films_have_the_rates_of_television() {
-    let dir = rig();
-    for (rate, ratio) in [("29.97", "F2997:100"), ("30000/1001", "F30000:1001"), ("24", "F24:1")] {
-        let film = good(dir.path(), &["render", "scene.toml", "-o", "f.y4m", "--force", "--fps", rate]);
-        assert!(film.stderr.is_empty());
-        let bytes = std::fs::read(dir.path().join("f.y4m")).unwrap();
-        let header = String::from_utf8_lossy(&bytes[..60]).into_owned();
-        assert!(header.contains(&format!(" {ratio} ")), "{header}");
-    }
-    refused(dir.path(), &["render", "scene.toml", "-o", "x.y4m", "--fps", "1/0"], 2, &["30000/1001"]);
-}
-
 /// A view is named as the shell completes its file, and by its file name where that is enough.
 #[test]
 fn views_are_found_by_the_end_of_their_path() {

@@ -84,38 +84,3 @@ fn the_errors_are_the_estimates_of_bound() {
         assert!(text.contains(line), "{line}: {text}");
     }
 }
-
-#[test]
-fn what_cannot_be_chosen_is_refused() {
-    let dir = rig();
-    refused(dir.path(), &["place", "scene.toml"], 2, &["--choose"]);
-    refused(dir.path(), &["place", "scene.toml", "--choose", "0"], 2, &["--choose 0", "at least one"]);
-    refused(
-        dir.path(),
-        &["place", "scene.toml", "--choose", "3"],
-        2,
-        &["--choose 3", "the scene has 2 views to"],
-    );
-    refused(
-        dir.path(),
-        &["place", "scene.toml", "--choose", "2", "--view", "left"],
-        2,
-        &["the scene has 1 view to"],
-    );
-    refused(
-        dir.path(),
-        &["place", "scene.toml", "--choose", "2", "--depth-step", "0"],
-        2,
-        &["--depth-step 0"],
-    );
-    refused(dir.path(), &["place", "none.toml", "--choose", "2"], 1, &["none.toml"]);
-    let far = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
-    let far = far.replace("[virtual]\nposition = 0.5", "[virtual]\nposition = 900.0");
-    std::fs::write(dir.path().join("far.toml"), far).unwrap();
-    refused(
-        dir.path(),
-        &["place", "far.toml", "--choose", "1"],
-        1,
-        &["far.toml", "no sample lies in the virtual image"],
-    );
-}

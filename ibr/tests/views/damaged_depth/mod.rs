@@ -12,7 +12,8 @@ use damage::Damage;
 fn check(name: &str, truth: &str, least: &[(Damage, f64)]) {
     let Some(case) = Case::of_data(name, truth).unwrap() else { return };
     let folder = tempfile::tempdir().unwrap();
-    for (damage, least) in least {
+    let all = trials::is_slow(&format!("damages of {name} after the first"));
+    for (damage, least) in least.iter().take(if all { least.len() } else { 1 }) {
         let found = case.rendered(*damage, folder.path()).unwrap().psnr;
         println!("{name}, {}: {found:.2} dB", damage.name());
         assert!(found >= *least, "{name}, {}: {found} below {least}", damage.name());

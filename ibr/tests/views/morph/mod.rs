@@ -1,4 +1,4 @@
-//! Views without cameras beside a morph of 20 lines: of twelve pairs of photographs none may be worse.
+//! Views without cameras beside a morph of 20 lines, which none may be worse than.
 
 mod pairs;
 mod plain;

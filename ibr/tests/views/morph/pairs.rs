@@ -1,4 +1,4 @@
-//! Pairs of photographs with tracks, and the view between them.
+//! Pairs of synthetic photographs with tracks, and the view between them.
 
 use crate::support::normal::normal;
 use hybank_ibr::camera::Camera;

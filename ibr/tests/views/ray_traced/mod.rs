@@ -111,24 +111,6 @@ fn a_bicubic_plane_is_sharper() {
     }
 }
 
-/// Camera positions along a path through a photograph, and with `HYBANK_SLOW=1` on through the other
-/// one: the error changes smoothly, so a film does not pulse. A photograph's own place is one of the
-/// positions.
-#[test]
-fn a_camera_path_does_not_pulse() {
-    let pair = shots(&[eye(-0.2, 0.0, 0.0), eye(0.2, 0.0, 0.0)]);
-    let error = |k: i32| {
-        let psnr = psnr(&pair, &eye(-0.25 + 0.05 * f64::from(k), 0.0, 0.0), &format!("path {k}"));
-        255.0 * 10.0_f64.powf(-psnr / 20.0)
-    };
-    let last = if trials::is_slow("a long path of cameras") { 10 } else { 4 };
-    let path: Vec<f64> = (0..=last).map(error).collect();
-    let steps: Vec<f64> = path.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
-    println!("root mean square errors {path:.2?}, steps {steps:.2?}");
-    assert!(path.iter().all(|e| *e < 2.5), "{path:?}");
-    assert!(steps.iter().all(|s| *s < 1.0), "grey levels from frame to frame: {steps:?}");
-}
-
 /// A slanted surface seen at twice its width: every pixel is covered, and between the samples the fit
 /// bridges. Disparity x + 40 from one unit away moves column x to 2 x + 40, and the offset brings it to 2 x.
 #[test]
