@@ -6,7 +6,8 @@
 //!   moments of intervals and triangles.
 //!
 //! The bounds of the theorems are expectations over random phases of the cameras' pixels. They are false
-//! for cameras that share a phase: N coincident cameras have the error of one. Lengths in images are pixels throughout.
+//! for cameras that share a phase: N coincident cameras have the error of one. Lengths in images are pixels
+//! throughout.
 
 pub(crate) mod delaunay;
 pub(crate) mod flat;
