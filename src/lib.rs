@@ -25,9 +25,7 @@ pub mod interchange;
 pub mod lmi;
 pub mod lti;
 pub mod measure;
-#[cfg(feature = "plot")]
 pub mod overview;
-#[cfg(feature = "plot")]
 pub mod plot;
 pub mod simulate;
 pub mod sine_fit;

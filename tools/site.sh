@@ -11,7 +11,7 @@ environment=$CARGO_TARGET_DIR/site-python
 # One choice of packages, as it decides features of the crates that they share.
 PYO3_NO_PYTHON=1 cargo build --quiet --workspace --lib --bins
 cargo doc --quiet --no-deps -p hybank -p hybank-runtime -p hybank-linalg -p hybank-ibr --lib \
-    --features hybank/flac,hybank/plot
+    --features hybank/flac
 install -m 755 "$CARGO_TARGET_DIR/debug/lib_hybank.so" python/hybank/_hybank.abi3.so
 
 "${HYBANK_PYTHON:-python3}" -m venv "$environment"

@@ -5,7 +5,7 @@ use super::design_report::{against, figure_text};
 use super::design_studies::number;
 use super::print::{Failure, InFile, show};
 use hybank::bank::Bank;
-use hybank::design::uncertainty::{BoxRule, BoxStudy, BoxWidths, RefusedBox};
+use hybank::design::uncertainty::{BoxRule, BoxStudy, BoxWidths, ReferenceChannel, RefusedBox};
 use hybank::design::{self, Analysis, DesignError, GammaScale, MeanAnalysis};
 use hybank::figures::{Figures, KeyFigures};
 use hybank::overview::{decibels, frequency, key_figures, six_digits, understood};
@@ -45,16 +45,46 @@ pub(super) struct Args {
     #[arg(long)]
     certify: bool,
     #[command(flatten)]
-    errors: BoxWidths,
+    errors: BoxArgs,
     /// Print the result as one JSON object
     #[arg(long)]
     json: bool,
 }
 
+/// The box of errors.
+#[derive(Debug, clap::Args)]
+struct BoxArgs {
+    /// Bound the worst case over delays that are off by up to this much (10ps, 0.01samples, or seconds): one
+    /// value for all channels but the reference, or one per channel
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::time)]
+    delay_box: Vec<Time>,
+    /// Also gains that are off by up to this share (1%, 500ppm, 0.01); values as for --delay-box
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
+    gain_box: Vec<f64>,
+    /// Also cut-offs that are off by up to this share; values as for --delay-box
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
+    cutoff_box: Vec<f64>,
+    /// The channel to which delays, gains and cut-offs are relative, from 1, or none if every channel has an
+    /// error of its own [default: 1 where one value is given for all channels]
+    #[arg(long, value_name = "CHANNEL|none")]
+    reference: Option<ReferenceChannel>,
+}
+
+impl BoxArgs {
+    fn widths(&self) -> BoxWidths {
+        BoxWidths {
+            delay_box: self.delay_box.clone(),
+            gain_box: self.gain_box.clone(),
+            cutoff_box: self.cutoff_box.clone(),
+            reference: self.reference,
+        }
+    }
+}
+
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
     let bank = load(&args.bank)?;
-    let errors = args.errors.error_box(&bank).map_err(|refused| bad_box(&refused))?;
+    let errors = args.errors.widths().error_box(&bank).map_err(|refused| bad_box(&refused))?;
     let delay_errors: Vec<Seconds> =
         args.delay_error.iter().map(|error| error.in_seconds(bank.fast_period)).collect();
     let analysis = design::analyze(&bank, &delay_errors).in_file(&args.bank)?;
@@ -87,7 +117,7 @@ impl Args {
             false if self.certify => {
                 usage("--certify proves the bank with its own delays; leave out --delay-error")
             }
-            false if self.errors.has_box() => {
+            false if self.errors.widths().has_box() => {
                 usage("a box of errors lies around the delays of the bank; leave out --delay-error")
             }
             _ => Ok(()),

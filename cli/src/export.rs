@@ -1,9 +1,9 @@
 //! `hybank export`: a bank for other tools.
 
 use super::bank_file::load;
+use super::choice::{Choice, named, one_of};
 use super::print::{Failure, InFile, check_json, failed, is_dash, print_json, warn};
 use super::written::{begin_file, check_output, check_outputs, write_bytes, write_together};
-use clap::ValueEnum;
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::analyze;
 use hybank::interchange::{Circuit, Format, Verilog, VerilogOptions, block_of_sections, export, sections};
@@ -36,7 +36,7 @@ pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
     bank: PathBuf,
     /// The format [default: that of the output's extension: h, v, csv, mat, coe or mem]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = one_of(FORMATS))]
     format: Option<Format>,
     /// The file to write; `-` is standard output
     #[arg(short, long)]
@@ -66,9 +66,7 @@ impl Args {
         let meant = match extension.as_str() {
             "h" => Some(Format::C99),
             "v" => Some(Format::Verilog),
-            name => Format::from_str(name, false)
-                .ok()
-                .filter(|format| !matches!(format, Format::C99 | Format::Sos)),
+            name => named(FORMATS, name).filter(|format| !matches!(format, Format::C99 | Format::Sos)),
         };
         self.format.or(meant).ok_or_else(|| {
             let message = "the name does not say which format it is to have; give --format c, verilog, csv, mat, coe, mem or sos";
@@ -76,6 +74,17 @@ impl Args {
         })
     }
 }
+
+/// What `--format` takes.
+const FORMATS: &[Choice<Format>] = &[
+    Choice { name: "c", help: "A C99 header with a streaming function", value: Format::C99 },
+    Choice { name: "csv", help: "Comma-separated values, one coefficient per line", value: Format::Csv },
+    Choice { name: "mat", help: "A MATLAB file (level 4), which SciPy reads too", value: Format::Mat },
+    Choice { name: "coe", help: "A coefficient file of Xilinx tools", value: Format::Coe },
+    Choice { name: "mem", help: "Hexadecimal words for $readmemh", value: Format::Mem },
+    Choice { name: "sos", help: "Second-order sections (CSV)", value: Format::Sos },
+    Choice { name: "verilog", help: "A module in Verilog-2001", value: Format::Verilog },
+];
 
 /// The circuit of a Verilog module.
 #[derive(Debug, clap::Args)]

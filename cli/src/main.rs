@@ -12,6 +12,7 @@ mod calibrate_report;
 mod capture_args;
 mod capture_check;
 mod capture_file;
+mod choice;
 mod contenders;
 mod demo;
 mod design;

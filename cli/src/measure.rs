@@ -2,6 +2,7 @@
 
 use super::capture_args::{CaptureArgs, check_stdin};
 use super::capture_file::{CaptureFile, MOST_MEASURED, Reading};
+use super::choice::{Choice, one_of};
 use super::plot::{check_picture, write_picture};
 use super::print::{Failure, InFile, failed_at, is_dash, name, show, warn};
 use super::written::check_output;
@@ -39,7 +40,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "M", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     interleaved: u16,
     /// Window of the spectrum (SFDR, noise density, plot); SINAD, THD and the spurs need none
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_parser = one_of(WINDOWS), default_value = "bh7")]
     window: Window,
     /// Highest order of the harmonics in THD
     #[arg(long, value_name = "H", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -139,6 +140,14 @@ fn spectrum(capture: &CaptureFile, window: Window) -> Spectrum {
     let finite: Vec<f64> = samples.map(|x| if x.is_finite() { *x } else { 0.0 }).collect();
     Spectrum::new(&finite, capture.rate, window)
 }
+
+/// What `--window` takes.
+const WINDOWS: &[Choice<Window>] = &[
+    Choice { name: "none", help: "No window", value: Window::None },
+    Choice { name: "hann", help: "Two terms", value: Window::Hann },
+    Choice { name: "bh4", help: "Four-term Blackman-Harris, side lobes at -92 dB", value: Window::Bh4 },
+    Choice { name: "bh7", help: "Seven-term Blackman-Harris, side lobes at -180 dB", value: Window::Bh7 },
+];
 
 impl Args {
     /// Refuses impossible combinations of options, before any file is read.

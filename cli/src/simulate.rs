@@ -2,7 +2,7 @@
 
 use super::bank_file::load_spec_or_bank;
 use super::print::{Failure, InFile, show, warn};
-use super::virtual_converters::{CommonReport, ConverterReport, bad_error, integers};
+use super::virtual_converters::{CommonReport, ConverterReport, ErrorArgs, bad_error, integers};
 use super::virtual_signal::{Signal, SignalArgs};
 use super::written::{Mono, begin_recording, check_outputs, write_together};
 use hybank::design::Problem;
@@ -10,7 +10,7 @@ use hybank::io::{Container, PcmFormat, SampleWriter, is_same_rate};
 use hybank::messages::{Quoted, counted};
 use hybank::overview::understood;
 use hybank::quantity::readable;
-use hybank::simulate::{Converter, ConverterErrors};
+use hybank::simulate::Converter;
 use hybank::spec::{ChannelSpec, Spec};
 use hybank::units::Hertz;
 use std::path::PathBuf;
@@ -68,7 +68,7 @@ pub(super) struct Args {
     #[arg(long)]
     json: bool,
     #[command(flatten)]
-    errors: ConverterErrors,
+    errors: ErrorArgs,
 }
 
 #[derive(Debug, serde::Serialize)]
@@ -99,7 +99,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let spec = load_spec_or_bank(&args.spec)?.for_outputs(&[])?;
     // The converters do not know what the spec says of the signal. Without latency the target lies on the
     // time axis of the output of `fuse`.
-    let errors = &args.errors;
+    let errors = args.errors.errors();
     let truth = errors.true_spec(&spec).map_err(|refused| bad_error(&refused))?;
     let problem = Problem::new(&Spec { signal: None, ..truth }, spec.wait()).in_file(&args.spec)?;
     let signal = Signal::read(&args.signal, &spec)?;
@@ -132,7 +132,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         slow_rate: rates.shown(),
         fast_rate: number(rates.fast),
         latency: spec.latency,
-        common: CommonReport::new(errors, &spec),
+        common: CommonReport::new(&errors, &spec),
         converters: reports,
         warnings,
     };
@@ -218,7 +218,7 @@ impl Args {
     /// The recordings of the channels and of the target, in this order.
     fn outputs(&self, kind: Kind, is_complex: bool, rates: &Rates) -> Vec<Output> {
         // A WAV file has the integers of the converters.
-        let codes = integers(&self.errors).filter(|_| kind == Kind::Wav).unwrap_or(PcmFormat::F32Le);
+        let codes = integers(self.errors.bits).filter(|_| kind == Kind::Wav).unwrap_or(PcmFormat::F32Le);
         let slow = rates.slow.iter().zip(1..).map(|(&rate, i)| (format!("ch{i}"), rate, codes));
         let names = slow.chain([("target".to_owned(), rates.fast, PcmFormat::F32Le)]);
         let extension = kind.extension(is_complex);

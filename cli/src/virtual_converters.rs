@@ -2,10 +2,61 @@
 
 use super::print::Failure;
 use hybank::io::PcmFormat;
-use hybank::quantity::readable;
+use hybank::quantity::{self, Time, readable};
 use hybank::simulate::{ConverterErrors, ErrorRule, ErrorsOfConverter, RefusedError};
 use hybank::spec::{ChannelSpec, Spec};
 use hybank::units::Seconds;
+
+/// How the converters differ from the spec.
+#[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Errors of the converters")]
+pub(super) struct ErrorArgs {
+    /// White noise on every sample, rms relative to full scale
+    #[arg(long, value_name = "RMS", default_value_t = 0.0, allow_hyphen_values = true)]
+    noise: f64,
+    /// Round to so many bits, 2 to 24, with full scale 1; samples beyond it are clipped and counted
+    #[arg(long, value_name = "B")]
+    pub(super) bits: Option<u32>,
+    /// Aperture jitter: each sample is taken this much off its instant, rms, as 2ps or 0.01samples [default:
+    /// 0]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = quantity::time)]
+    jitter: Option<Time>,
+    /// By how many parts per million the clocks are too fast, one value for all or one per channel
+    #[arg(long, value_name = "PPM,..", value_delimiter = ',', allow_hyphen_values = true)]
+    drift: Vec<f64>,
+    /// True delays minus those of the spec, as 10ps or 0.01samples, one value for all or one per channel
+    #[arg(long, value_name = "TIME,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::time)]
+    delay_error: Vec<Time>,
+    /// Relative errors of the gains, as 1% or 0.01, one value for all or one per channel
+    #[arg(long, value_name = "SHARE,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
+    gain_error: Vec<f64>,
+    /// Relative errors of the cut-offs of the front ends, as 1% or 0.01, one value for all or one per
+    /// channel; of the stage that `fit` of the spec names, if it names one
+    #[arg(long, value_name = "SHARE,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
+    cutoff_error: Vec<f64>,
+    /// Offsets relative to full scale, added to those of the spec, one value for all or one per channel
+    #[arg(long, value_name = "O,..", value_delimiter = ',', allow_hyphen_values = true)]
+    offset: Vec<f64>,
+    /// Seed of noise and jitter; the same seed gives the same samples
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+}
+
+impl ErrorArgs {
+    pub(super) fn errors(&self) -> ConverterErrors {
+        ConverterErrors {
+            noise: self.noise,
+            bits: self.bits,
+            jitter: self.jitter,
+            drift: self.drift.clone(),
+            delay_error: self.delay_error.clone(),
+            gain_error: self.gain_error.clone(),
+            cutoff_error: self.cutoff_error.clone(),
+            offset: self.offset.clone(),
+            seed: self.seed,
+        }
+    }
+}
 
 /// What all converters have in common.
 #[derive(Debug, serde::Serialize)]
@@ -63,9 +114,9 @@ impl ConverterReport {
     }
 }
 
-/// The format of the converters' codes, if they have any.
-pub(super) fn integers(errors: &ConverterErrors) -> Option<PcmFormat> {
-    errors.bits.map(|bits| if bits <= 16 { PcmFormat::S16Le } else { PcmFormat::S24Le })
+/// The format of the codes of converters with so many bits.
+pub(super) fn integers(bits: Option<u32>) -> Option<PcmFormat> {
+    bits.map(|bits| if bits <= 16 { PcmFormat::S16Le } else { PcmFormat::S24Le })
 }
 
 impl CommonReport {

@@ -93,13 +93,11 @@ fn unread(source: FileError, remedy: &'static str) -> InputError {
 }
 
 /// The text of a scene file.
-#[cfg(feature = "cli")]
 pub(crate) fn read_scene(path: &Path) -> Result<String, InputError> {
     files::read_text(path, SCENE).map_err(|source| unread(source, "check the path"))
 }
 
 /// The text of a scene from a stream called `name`.
-#[cfg(feature = "cli")]
 pub(crate) fn text(stream: impl std::io::Read, name: &str) -> Result<String, FileError> {
     files::text_in(files::bytes_of(stream, name, SCENE)?, name)
 }

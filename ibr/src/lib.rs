@@ -3,7 +3,6 @@
 
 pub mod analysis;
 pub mod camera;
-#[cfg(feature = "cli")]
 pub mod cli;
 pub mod depth;
 pub mod files;

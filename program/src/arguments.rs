@@ -18,15 +18,8 @@ pub fn arguments<A: clap::CommandFactory + clap::FromArgMatches>() -> Result<A, 
     A::from_arg_matches(&command.try_get_matches()?)
 }
 
-/// What clap says of the usage of this program, with the arguments in it quoted. `None` where that changes
-/// nothing: then clap can print it, with its colours.
-pub fn quoted_usage(message: &clap::Error) -> Option<String> {
-    // As it was typed, and as clap shows it: without the sequences that colour a terminal.
-    let forms = |argument: std::ffi::OsString| {
-        let typed = argument.to_string_lossy().into_owned();
-        [clap::builder::StyledStr::from(typed.clone()).to_string(), typed]
-    };
-    let text = message.to_string();
-    let quoted = usage(&text, std::env::args_os().flat_map(forms));
-    (quoted != text).then_some(quoted)
+/// What clap says of the usage of this program, with the arguments in it quoted.
+pub(crate) fn quoted_usage(message: &clap::Error) -> String {
+    let typed = std::env::args_os().map(|argument| argument.to_string_lossy().into_owned());
+    usage(&message.to_string(), typed)
 }

@@ -15,7 +15,7 @@
 mod arguments;
 pub mod interrupts;
 
-pub use arguments::{arguments, quoted_usage};
+pub use arguments::arguments;
 
 use hybank_core::messages::{Quoted, printable, shown};
 use std::io::{self, ErrorKind, IsTerminal, Write};
@@ -90,17 +90,12 @@ impl Program {
 
     /// Shows help, the version or what is wrong with the usage; the exit code.
     pub fn show(&self, message: &clap::Error) -> ExitCode {
-        let printed = match quoted_usage(message) {
-            None => message.print(),
-            Some(text) => {
-                say(&text);
-                Ok(())
-            }
-        };
-        match printed {
-            Err(error) if !message.use_stderr() => self.end(Err(Failure::printing(&error))),
-            _ => ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2)),
+        if message.use_stderr() {
+            say(&arguments::quoted_usage(message));
+        } else if let Err(failure) = print(&message.to_string()) {
+            return self.end(Err(failure));
         }
+        ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2))
     }
 }
 

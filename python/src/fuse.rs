@@ -160,7 +160,7 @@ impl Fused<'_> {
             .with("rate", rate)?
             .with("captures", captures.summary())?
             .with("latency_dropped", *latency_dropped)?
-            .with("peak", pipeline::peak(*number, bytes.as_slice().map_err(refused)?))?
+            .with("peak", number.peak(bytes.as_slice().map_err(refused)?))?
             .with("seconds", *seconds)?
             .with("warnings", self.warnings())?
             .with("missing", outcome.gaps.as_ref().map(|gaps| gaps.missing))?

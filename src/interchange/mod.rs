@@ -43,23 +43,21 @@ use crate::bank::Bank;
 
 /// A format of [`export`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[non_exhaustive]
 pub enum Format {
-    /// A C99 header with a streaming function
-    #[cfg_attr(feature = "clap", value(name = "c"))]
+    /// A C99 header with a streaming function.
     C99,
-    /// Comma-separated values, one coefficient per line
+    /// Comma-separated values, one coefficient per line.
     Csv,
-    /// A MATLAB file (level 4), which SciPy reads too
+    /// A MATLAB file (level 4), which SciPy reads too.
     Mat,
-    /// A coefficient file of Xilinx tools
+    /// A coefficient file of Xilinx tools.
     Coe,
-    /// Hexadecimal words for $readmemh
+    /// Hexadecimal words for $readmemh.
     Mem,
-    /// Second-order sections (CSV)
+    /// Second-order sections (CSV).
     Sos,
-    /// A module in Verilog-2001
+    /// A module in Verilog-2001.
     Verilog,
 }
 

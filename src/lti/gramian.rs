@@ -132,6 +132,7 @@ fn kept(sigma: &[f64], floor: f64) -> usize {
 mod tests {
     use super::*;
     use crate::linalg::Complex;
+    use nalgebra::DVector;
 
     #[test]
     fn solves_the_lyapunov_equation() {
@@ -166,8 +167,8 @@ mod tests {
             Mat::from_row_slice(4, 4, &[0.9, 0.2, 0., 0., 0., 0.5, 0., 0., 0., 0., 0.3, 0., 0., 0., 1.0, 0.]);
         let b = Mat::from_row_slice(4, 1, &[0.0, 1.0, 0.0, 0.0]);
         for scale in [1e-9, 1.0, 1e9] {
-            let units = Mat::from_diagonal(&nalgebra::dvector![1.0, scale, 1.0, 1.0]);
-            let back = Mat::from_diagonal(&nalgebra::dvector![1.0, 1.0 / scale, 1.0, 1.0]);
+            let units = Mat::from_diagonal(&DVector::from_vec(vec![1.0, scale, 1.0, 1.0]));
+            let back = Mat::from_diagonal(&DVector::from_vec(vec![1.0, 1.0 / scale, 1.0, 1.0]));
             let c = GramianCoordinates::new(&(&units * &a * &back), &(&units * &b), 1e-12).unwrap();
             assert_eq!(c.a.nrows(), 2);
             let unity = &c.a * c.a.transpose() + &c.b * c.b.transpose();
@@ -213,7 +214,7 @@ mod tests {
     #[test]
     fn uncontrollable_and_negligible_states_are_left_out() {
         // Observable and controllable; not controllable; hardly observable.
-        let a = Mat::from_diagonal(&nalgebra::dvector![0.5, 0.9, -0.3]);
+        let a = Mat::from_diagonal(&DVector::from_vec(vec![0.5, 0.9, -0.3]));
         let b = Mat::from_column_slice(3, 1, &[1.0, 0.0, 1.0]);
         let c = Mat::from_row_slice(1, 3, &[1.0, 1.0, 1e-9]);
         let system = StateSpace::new(a, b, c, Mat::zeros(1, 1));

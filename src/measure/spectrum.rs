@@ -9,16 +9,15 @@ const J: Complex<f64> = Complex::new(0.0, 1.0);
 /// A window w(n) = sum over k of (-1)^k a_k cos(2 pi k n / N), after Harris (1978) and Albrecht (2001).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
-#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[non_exhaustive]
 pub enum Window {
-    /// No window
+    /// No window.
     None,
-    /// Two terms
+    /// Two terms.
     Hann,
-    /// Four-term Blackman-Harris, side lobes at -92 dB
+    /// Four-term Blackman-Harris, side lobes at -92 dB.
     Bh4,
-    /// Seven-term Blackman-Harris, side lobes at -180 dB
+    /// Seven-term Blackman-Harris, side lobes at -180 dB.
     #[default]
     Bh7,
 }

@@ -30,45 +30,24 @@ const MOST_CUTOFF_ERROR: f64 = 0.5;
 /// # Ok::<_, Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Default, PartialEq)]
-#[cfg_attr(feature = "clap", derive(clap::Args), command(next_help_heading = "Errors of the converters"))]
 pub struct ConverterErrors {
-    /// White noise on every sample, rms relative to full scale
-    #[cfg_attr(
-        feature = "clap",
-        arg(long, value_name = "RMS", default_value_t = 0.0, allow_hyphen_values = true)
-    )]
+    /// White noise on every sample, rms relative to full scale.
     pub noise: f64,
-    /// Round to so many bits, 2 to 24, with full scale 1; samples beyond it are clipped and counted
-    #[cfg_attr(feature = "clap", arg(long, value_name = "B"))]
+    /// Samples are rounded to so many bits, 2 to 24, with full scale 1; those beyond it are clipped and counted.
     pub bits: Option<u32>,
-    /// Aperture jitter: each sample is taken this much off its instant, rms, as 2ps or 0.01samples [default:
-    /// 0]
-    #[cfg_attr(feature = "clap", arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = crate::quantity::time))]
+    /// Aperture jitter: each sample is taken this much off its instant, rms.
     pub jitter: Option<Time>,
-    /// By how many parts per million the clocks are too fast, one value for all or one per channel
-    #[cfg_attr(
-        feature = "clap",
-        arg(long, value_name = "PPM,..", value_delimiter = ',', allow_hyphen_values = true)
-    )]
+    /// By how many parts per million the clocks are too fast.
     pub drift: Vec<f64>,
-    /// True delays minus those of the spec, as 10ps or 0.01samples, one value for all or one per channel
-    #[cfg_attr(feature = "clap", arg(long, value_name = "TIME,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = crate::quantity::time))]
+    /// True delays minus those of the spec.
     pub delay_error: Vec<Time>,
-    /// Relative errors of the gains, as 1% or 0.01, one value for all or one per channel
-    #[cfg_attr(feature = "clap", arg(long, value_name = "SHARE,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = crate::quantity::relative))]
+    /// Relative errors of the gains.
     pub gain_error: Vec<f64>,
-    /// Relative errors of the cut-offs of the front ends, as 1% or 0.01, one value for all or one per
-    /// channel; of the stage that `fit` of the spec names, if it names one
-    #[cfg_attr(feature = "clap", arg(long, value_name = "SHARE,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = crate::quantity::relative))]
+    /// Relative errors of the cut-offs of the front ends; of the stage that `fit` of the spec names, if it names one.
     pub cutoff_error: Vec<f64>,
-    /// Offsets relative to full scale, added to those of the spec, one value for all or one per channel
-    #[cfg_attr(
-        feature = "clap",
-        arg(long, value_name = "O,..", value_delimiter = ',', allow_hyphen_values = true)
-    )]
+    /// Offsets relative to full scale, added to those of the spec.
     pub offset: Vec<f64>,
-    /// Seed of noise and jitter; the same seed gives the same samples
-    #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = 0))]
+    /// Seed of noise and jitter; the same seed gives the same samples.
     pub seed: u64,
 }
 

@@ -42,5 +42,5 @@ pub use fusion::{DroppedLatency, Settings};
 pub use gaps::{Gap, GapPolicy, GapSummary, LISTED_GAPS};
 pub use offline::{fuse, fused};
 pub use outcome::{Outcome, PipelineError, Warning};
-pub use outputs::{FileOutputs, peak};
+pub use outputs::FileOutputs;
 pub use streaming::{Block, Pipeline};

@@ -54,7 +54,6 @@ pub use choice::Choice;
 pub use estimate::{Calibration, Predicted, Totals, ViewError};
 pub use jitter::{depth_jitter, with_noise};
 pub use predictor::Predictor;
-#[cfg(feature = "cli")]
 pub(crate) use regressors::difference;
 
 /// What an error comes from.

@@ -5,15 +5,14 @@ use crate::files::InputError;
 use ::image::{DynamicImage, ImageBuffer};
 
 /// Bits per value of a PNG file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 pub enum Levels {
     /// 256 levels.
     #[default]
-    #[cfg_attr(feature = "cli", value(name = "8"))]
+    #[value(name = "8")]
     Eight,
     /// 65536 levels: white is 65535.
-    #[cfg_attr(feature = "cli", value(name = "16"))]
+    #[value(name = "16")]
     Sixteen,
 }
 

@@ -3,8 +3,7 @@
 use crate::occlusion::LARGEST_SPACING;
 
 /// Hole filling.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 #[non_exhaustive]
 pub enum HoleFill {
     /// Continue the farther side into holes between surfaces; bridge cracks within one.

@@ -18,8 +18,7 @@ use crate::setting::{NOT_NEGATIVE, POSITIVE, SMOOTHING, SettingError};
 pub type Watch<'a> = &'a (dyn Fn(f64) + Sync);
 
 /// Degree of the splines of the plane.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 #[non_exhaustive]
 pub enum Degree {
     /// Linear B-splines.

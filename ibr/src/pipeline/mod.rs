@@ -26,8 +26,7 @@ use crate::sample::Dropped;
 use crate::setting::{FINITE, POSITIVE, SettingError};
 
 /// The method of the third stage.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
 #[non_exhaustive]
 pub enum Method {
     /// rows for rectified rigs, plane for other scenes.

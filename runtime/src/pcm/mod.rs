@@ -4,6 +4,7 @@
 //! Numbers map back by rounding to the nearest integer (ties to even) and saturating.
 
 mod frames;
+mod peak;
 
 pub use frames::{PcmFrames, SampleLayout};
 

@@ -12,21 +12,15 @@ const MOST_SHARE: f64 = 0.5;
 /// How far the channels may be off, in both directions. A list has no value, one for all channels but the
 /// reference, or one for each.
 #[derive(Debug, Clone, Default, PartialEq)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct BoxWidths {
-    /// Bound the worst case over delays that are off by up to this much (10ps, 0.01samples, or seconds): one
-    /// value for all channels but the reference, or one per channel
-    #[cfg_attr(feature = "clap", arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = crate::quantity::time))]
+    /// By how much the delays may be off.
     pub delay_box: Vec<Time>,
-    /// Also gains that are off by up to this share (1%, 500ppm, 0.01); values as for --delay-box
-    #[cfg_attr(feature = "clap", arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = crate::quantity::relative))]
+    /// By which share the gains may be off.
     pub gain_box: Vec<f64>,
-    /// Also cut-offs that are off by up to this share; values as for --delay-box
-    #[cfg_attr(feature = "clap", arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = crate::quantity::relative))]
+    /// By which share the cut-offs may be off.
     pub cutoff_box: Vec<f64>,
-    /// The channel to which delays, gains and cut-offs are relative, from 1, or none if every channel has an
-    /// error of its own [default: 1 where one value is given for all channels]
-    #[cfg_attr(feature = "clap", arg(long, value_name = "CHANNEL|none"))]
+    /// The channel to which delays, gains and cut-offs are relative. Left out it is the first one where one
+    /// value is given for all channels.
     pub reference: Option<ReferenceChannel>,
 }
 

@@ -3,6 +3,7 @@
 
 use super::*;
 use crate::linalg::{CMat, Complex};
+use nalgebra::DVector;
 
 /// Points on the unit circle and off it.
 fn points() -> impl Iterator<Item = Complex<f64>> {
@@ -80,9 +81,9 @@ fn gains_multiply_from_their_side() {
         check(&g.map_outputs(&t), |z| c(&t) * g.response_at(z), 1e4);
         check(&g.map_inputs(&t), |z| g.response_at(z) * c(&t), 1e4);
         assert_eq!(g.map_outputs(&t), g.series(&StateSpace::gain(t.clone())));
-        let diagonal = Mat::from_diagonal(&nalgebra::dvector![2.0, -4.0]);
+        let diagonal = Mat::from_diagonal(&DVector::from_vec(vec![2.0, -4.0]));
         assert_eq!(g.scale_inputs(&[2.0, -4.0]), g.map_inputs(&diagonal));
-        let diagonal = Mat::from_diagonal(&nalgebra::dvector![2.0, -4.0, 0.0]);
+        let diagonal = Mat::from_diagonal(&DVector::from_vec(vec![2.0, -4.0, 0.0]));
         assert_eq!(g.scale_outputs(&[2.0, -4.0, 0.0]), g.map_outputs(&diagonal));
     }
 }
