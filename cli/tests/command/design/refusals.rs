@@ -31,6 +31,8 @@ fn a_wrong_spec_is_answered_with_place_reason_and_remedy() {
         "target_snr_db = 300\n",
         &["an SNR of 300.0 dB is out of reach", "latency 10"],
     );
+    bad_spec(&desk, "taps = 22\n", "target_sfdr_db = -1\n", &["target_sfdr_db", "0 to 300 dB"]);
+    bad_spec(&desk, "\"fir\"\ntaps = 22", "\"h2\"\ntaps = 4000", &["at most 2048 samples"]);
     bad_spec(&desk, "delay = 1.2", "delay = 1.2\nbits = 40", &["bits", "1 to 32"]);
     bad_spec(&desk, "delay = 1.2", "delay = 1.2\njitter = 3", &["jitter", "check its unit"]);
     bad_spec(&desk, "\"fir\"", "\"fri\"", &["bad.toml:11:", "did you mean \"fir\"?"]);
