@@ -76,7 +76,11 @@ pub(super) fn parse_spec(text: &str, path: &Path, overrides: DesignOverrides) ->
 
 /// A value of the command line that was given in place of the spec's `key`.
 pub(super) fn bad_flag(key: &str, problem: &SpecProblem) -> Failure {
-    let flag = if key == "target_snr_db" { "snr".to_owned() } else { key.replace('_', "-") };
+    let flag = match key {
+        "target_snr_db" => "snr".to_owned(),
+        "target_sfdr_db" => "sfdr".to_owned(),
+        _ => key.replace('_', "-"),
+    };
     Failure::Input(format!("--{flag}: {problem}"))
 }
 

@@ -58,6 +58,10 @@ pub(super) struct Args {
     /// and h2)
     #[arg(long, value_name = "DB", conflicts_with = "taps")]
     snr: Option<f64>,
+    /// The fewest taps whose images of a tone all lie at least this many decibels below it (methods fir and
+    /// h2)
+    #[arg(long, value_name = "DB", conflicts_with_all = ["taps", "snr"])]
+    sfdr: Option<f64>,
     /// Latency in fast samples, in place of that of the spec
     #[arg(long)]
     latency: Option<usize>,
@@ -127,6 +131,7 @@ fn overrides(args: &Args) -> DesignOverrides {
         method: args.method,
         taps: args.taps,
         target_snr_db: args.snr,
+        target_sfdr_db: args.sfdr,
         gamma_margin: args.gamma_margin,
         bits: args.bits.clone(),
         fraction_bits: args.fraction_bits,

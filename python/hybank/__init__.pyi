@@ -302,6 +302,7 @@ def design(
     method: Literal["fir", "iir", "h2", "sinc", "separation"] | None = None,
     taps: int | np.integer[Any] | None = None,
     target_snr_db: float | np.number[Any] | None = None,
+    target_sfdr_db: float | np.number[Any] | None = None,
     gamma_margin: float | np.number[Any] | None = None,
     bits: int | Sequence[int] | np.integer[Any] | NDArray[Any] | None = None,
     fraction_bits: int | np.integer[Any] | None = None,

@@ -6,8 +6,8 @@ from hybank._hybank import design as _design
 from hybank._keywords import checked
 
 _DESIGN_KEYS = (
-    "method", "taps", "target_snr_db", "gamma_margin", "bits", "fraction_bits", "loss_db", "order",
-    "reduction_loss_db", "noise",
+    "method", "taps", "target_snr_db", "target_sfdr_db", "gamma_margin", "bits", "fraction_bits", "loss_db",
+    "order", "reduction_loss_db", "noise",
 )
 # Every form of a filter has one of these keys.
 _FILTER_KEYS = ("family", "num", "den", "zeros", "poles", "a", "cascade")
@@ -21,8 +21,8 @@ def _given(**entries):
 def design(
     source=None, /, *, name=None, fast_rate=None, fast_period=None, ratio=None, latency=None, target=None, channels=None,
     channel=None, signal=None, uncertainty=None, full_scale=None, fit=None, design=None, method=None, taps=None,
-    target_snr_db=None, gamma_margin=None, bits=None, fraction_bits=None, loss_db=None, order=None,
-    reduction_loss_db=None, noise=None, replace=None, proof=True, limit=True, progress=None
+    target_snr_db=None, target_sfdr_db=None, gamma_margin=None, bits=None, fraction_bits=None, loss_db=None,
+    order=None, reduction_loss_db=None, noise=None, replace=None, proof=True, limit=True, progress=None
 ):
     """Design the bank of a spec: a path, a TOML text of several lines, a mapping, or keywords.
 
@@ -60,6 +60,8 @@ def design(
         Taps per channel.
     target_snr_db : float, optional
         In place of taps: the fewest taps for this signal-to-noise ratio.
+    target_sfdr_db : float, optional
+        The same for the distance of the largest image of a tone.
     gamma_margin : float, optional
         Share by which gamma may exceed its minimum.
     bits : int or list, optional

@@ -1,10 +1,9 @@
-//! Covariances of the front ends' outputs for white noise of unit density at the analog input, exact or
-//! averaged over Gaussian errors of the instants.
+//! Covariances of the front ends' outputs for white noise of unit density at the analog input, and what
+//! jitter makes of them.
 //!
-//! With x the joint analog state and X its covariance, `c(t) = E[y(s + t) y(s)'] = C e^{A t} X C'` for t >=
-//! 0, and c(-t) = c(t)'. Two instants that are off by independent Gaussian errors have the covariance `E
-//! c(t + d)`, d of the variance of their difference: the average multiplies the cross-spectrum by the
-//! characteristic function. It is a sum over Gauss-Legendre panels that begin at the kink of c at t = 0.
+//! With x the joint analog state and X its covariance, `c(t) = E[y(s + t) y(s)] = C e^{A t} X C'` for t >= 0,
+//! and c(-t) = c(t). Over a Gaussian time d an output changes by the mean square `2 (c(0) - E c(d))`. That
+//! is a sum over Gauss-Legendre panels that begin at the kink of c at t = 0.
 
 use super::DesignError;
 use super::lifting::JointState;
@@ -32,24 +31,6 @@ pub(crate) struct Covariances {
     /// Var(C A x): of the derivatives, as far as the state determines them.
     slopes: Vec<f64>,
     poles: Vec<Complex<f64>>,
-}
-
-/// Covariances averaged over Gaussian differences of one deviation.
-pub(crate) struct Averaged<'a> {
-    covariances: &'a Covariances,
-    deviation: f64,
-    /// Of the panels in [0, 2 GAUSSIAN_REACH deviation].
-    nodes: Vec<Node>,
-    /// The state's part of the average at [`GAUSSIAN_REACH`]: e^{A u} X C' averaged over the Gaussian.
-    far: Mat,
-}
-
-/// A node of the quadrature.
-struct Node {
-    time: f64,
-    weight: f64,
-    /// c at this time.
-    value: Mat,
 }
 
 impl Covariances {
@@ -86,25 +67,27 @@ impl Covariances {
             return 0.0;
         }
         let power = self.power(front_end);
-        let difference = 2.0 * (power - self.averaged(deviation).at(front_end, front_end, 0.0));
+        let difference = self.averaged_change(front_end, deviation.0);
         if difference > RESOLVED_SHARE * power {
             return difference;
         }
         difference.max(self.slopes[front_end] * deviation.0 * deviation.0)
     }
 
-    /// The averages over differences of this deviation; 0 for exact instants.
-    pub(crate) fn averaged(&self, deviation: FastPeriods) -> Averaged<'_> {
-        let mut averaged = Averaged {
-            covariances: self,
-            deviation: deviation.0,
-            nodes: Vec::new(),
-            far: self.inputs.clone(),
-        };
-        if deviation.0 > 0.0 {
-            averaged.tabulate();
+    /// The change as a sum over panels.
+    fn averaged_change(&self, front_end: usize, deviation: f64) -> f64 {
+        let (output, power) = (self.joint.c().row(front_end), self.power(front_end));
+        let density = |t: f64| (-0.5 * (t / deviation).powi(2)).exp() * 2.0 / (deviation * TAU.sqrt());
+        let (mut time, mut state, mut sum) = (0.0, self.inputs.column(front_end).into_owned(), 0.0);
+        for width in self.panels(deviation, GAUSSIAN_REACH * deviation) {
+            for (part, share) in NODES {
+                let covariance = (output * (self.joint.transition(part * width) * &state))[0];
+                sum += share * width * density(time + part * width) * 2.0 * (power - covariance);
+            }
+            state = self.joint.transition(width) * state;
+            time += width;
         }
-        averaged
+        sum
     }
 
     /// Widths of panels that cover [0, length]: short at the kink, then limited by oscillations.
@@ -121,58 +104,6 @@ impl Covariances {
             width = (PANEL_GROWTH * width).min(widest);
         }
         widths
-    }
-}
-
-impl Averaged<'_> {
-    fn tabulate(&mut self) {
-        let joint = &self.covariances.joint;
-        let (mut time, mut state) = (0.0, self.covariances.inputs.clone());
-        let mut known: Option<(f64, Vec<Mat>)> = None;
-        self.far = Mat::zeros(state.nrows(), state.ncols());
-        for width in self.covariances.panels(self.deviation, 2.0 * GAUSSIAN_REACH * self.deviation) {
-            let transitions = match known.take() {
-                Some((same, transitions)) if same == width => transitions,
-                _ => NODES
-                    .iter()
-                    .map(|node| node.0)
-                    .chain([1.0])
-                    .map(|part| joint.transition(part * width))
-                    .collect(),
-            };
-            for ((part, share), transition) in NODES.into_iter().zip(&transitions) {
-                let (at, weight, moved) = (time + part * width, share * width, transition * &state);
-                self.far += &moved * (weight * self.density(at - GAUSSIAN_REACH * self.deviation));
-                self.nodes.push(Node { time: at, weight, value: joint.c() * moved });
-            }
-            state = &transitions[NODES.len()] * state;
-            time += width;
-            known = Some((width, transitions));
-        }
-    }
-
-    fn density(&self, difference: f64) -> f64 {
-        let x = difference / self.deviation;
-        (-0.5 * x * x).exp() / (self.deviation * TAU.sqrt())
-    }
-
-    /// E[y_a(s + t + d) y_b(s)].
-    pub(crate) fn at(&self, a: usize, b: usize, t: f64) -> f64 {
-        if t < 0.0 {
-            return self.at(b, a, -t);
-        }
-        let joint = &self.covariances.joint;
-        let beyond = t - GAUSSIAN_REACH * self.deviation;
-        if beyond >= 0.0 {
-            let state = joint.transition(beyond) * self.far.column(b);
-            return (joint.c().row(a) * state)[0];
-        }
-        let term = |node: &Node| {
-            let after = node.value[(a, b)] * self.density(node.time - t);
-            let before = node.value[(b, a)] * self.density(node.time + t);
-            node.weight * (after + before)
-        };
-        self.nodes.iter().map(term).sum()
     }
 }
 

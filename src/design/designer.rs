@@ -1,15 +1,15 @@
 //! The steps from a spec to a finished bank.
 
 use super::limits::{Stage, Stop, TIME_LIMIT, remedy};
-use super::merging::Repeats;
 use super::methods::robust_fir::RobustStudy;
 use super::methods::{self, Settings, Synthesis};
 use super::plant::LiftedPlant;
+use super::preparation::{Comparison, merged, settings};
 use super::problem::Problem;
 use super::quantise::WordStudy;
 use super::realise::{Realised, realise};
 use super::reduction::OrderReduction;
-use super::sizing::{Comparison, Sizing, settings};
+use super::sizing::Sizing;
 use super::{DesignError, filters, prove};
 use crate::analog::SignalFilter;
 use crate::bank::{Bank, Gamma, SynthesisFilters};
@@ -118,11 +118,8 @@ fn designed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
     let problem = Problem { latency: sizing.latency, ..problem };
     (options.observer)(Stage::Filters);
     let settings = Settings { stop: stop.clone(), ..settings(spec, sizing.taps)? };
-    let merged = if settings.robust.is_some() || settings.deviations.is_some() {
-        problem.merge_channels(Repeats::Never)
-    } else {
-        problem.merge_channels(Repeats::of(spec)).of_unit_size()?
-    };
+    let apart = settings.robust.is_some() || !settings.deviations.is_empty();
+    let merged = merged(spec, &problem, apart)?;
     let plant = LiftedPlant::new(&merged.problem);
     let synthesis = methods::synthesise(spec.design.method, &plant, &settings)?;
     (options.observer)(Stage::Realisation);

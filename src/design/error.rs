@@ -1,5 +1,6 @@
 //! Errors of design and analysis.
 
+use super::length::Figure;
 use super::limits::{MAX_LONG_STATES, MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS};
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
@@ -151,13 +152,14 @@ pub enum DesignError {
         /// Most states.
         limit: usize,
     },
-    /// No number of taps reaches the SNR that was asked for.
+    /// No number of taps reaches the figure that was asked for.
     #[error(
-        "an SNR of {wanted:.1} dB is out of reach: no bank of latency {latency} has more than {best:.1} dB over the whole \
-         spectrum of the signal, its floor outside the band included; ask for less, give taps instead, raise floor_db, \
-         allow a longer latency, or state less noise"
+        "an {figure} of {wanted:.1} dB is out of reach: no bank of latency {latency} has more than {best:.1} dB; ask for \
+         less, give taps instead, allow a longer latency, or state less noise"
     )]
-    SnrOutOfReach {
+    FigureOutOfReach {
+        /// Which.
+        figure: Figure,
         /// Decibels.
         wanted: f64,
         /// The most that any number of taps reaches, in decibels.
@@ -165,12 +167,14 @@ pub enum DesignError {
         /// m0, fast samples.
         latency: usize,
     },
-    /// The bank of least gamma misses the SNR that was asked for, whatever its length.
+    /// The bank of least gamma misses the figure that was asked for, whatever its length.
     #[error(
-        "no bank of least gamma of up to {taps} taps has the SNR of {wanted:.1} dB that was asked for, the best has {best:.1} \
+        "no bank of least gamma of up to {taps} taps has the {figure} of {wanted:.1} dB that was asked for, the best has {best:.1} \
          dB: it does not minimise the mean square; use method = \"h2\", ask for less, or give taps"
     )]
-    SnrMissed {
+    FigureMissed {
+        /// Which.
+        figure: Figure,
         /// Decibels.
         wanted: f64,
         /// The best of the lengths that were designed, in decibels.

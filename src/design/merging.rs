@@ -132,22 +132,14 @@ impl Problem {
     /// # Errors
     /// [`DesignError::Lti`] if a decomposition does not converge.
     pub(super) fn measurement_units(&self) -> Result<Vec<f64>, DesignError> {
-        let is_usual = |size: f64| (1.0 / USUAL_SIZE..=USUAL_SIZE).contains(&size);
-        let unit = |size: f64| if is_usual(size) { 1.0 } else { 1.0 / power_of_two(size) };
-        Ok(self.measurement_sizes()?.into_iter().map(unit).collect())
-    }
-
-    /// The root mean square of the samples of each channel for white noise of unit density at the analog
-    /// input, without the noise of the converter.
-    ///
-    /// # Errors
-    /// As [`Problem::measurement_units`].
-    pub(super) fn measurement_sizes(&self) -> Result<Vec<f64>, DesignError> {
         let joint = JointState::new(self);
         let (transition, input) = joint.over(self.ratio as f64);
         let outputs = joint.c() * controllability_root(&transition, &input)?;
-        let size = |channel: &Channel| channel.gain.abs() * outputs.row(channel.front_end).norm();
-        Ok(self.channels.iter().map(size).collect())
+        let unit = |channel: &Channel| {
+            let size = channel.gain.abs() * outputs.row(channel.front_end).norm();
+            if (1.0 / USUAL_SIZE..=USUAL_SIZE).contains(&size) { 1.0 } else { 1.0 / power_of_two(size) }
+        };
+        Ok(self.channels.iter().map(unit).collect())
     }
 }
 

@@ -2,27 +2,36 @@
 //! system ([`LiftedPlant`]); an IIR, H2 or FIR method finds the filters; a certificate proves their error.
 
 pub mod analysis;
-pub(crate) mod covariances;
+mod causal_errors;
+mod covariances;
 mod designer;
+mod deviations;
 mod error;
 mod error_grid;
 mod exchange;
+mod figure_band;
 pub mod filters;
-mod history_errors;
-mod least_errors;
+mod fir_errors;
+
+mod length;
 mod lifting;
 mod limits;
 mod merging;
 mod methods;
 mod normalise;
 pub mod plant;
+mod preparation;
 pub mod problem;
 mod prove;
+mod quadrature;
 pub mod quantise;
 mod realise;
 mod reduction;
 pub mod responses;
+mod root_covariance;
+mod signal;
 mod sizing;
+mod tones;
 pub mod uncertainty;
 mod warnings;
 
@@ -31,16 +40,21 @@ pub use analysis::{
 };
 pub(crate) use analysis::{NearestSample, nearest_samples};
 pub use designer::{Design, Options, ProofSearch, design, judge_taps};
+pub(crate) use deviations::Deviations;
 pub use error::DesignError;
+pub use figure_band::{BandSource, FigureBand};
+pub use length::Figure;
 pub use limits::{Stage, Stop, TIME_LIMIT, remedy};
-pub(crate) use methods::Deviations;
 pub use methods::robust_fir::{RobustNorms, RobustStudy};
 pub use plant::LiftedPlant;
 pub use problem::Problem;
 pub use prove::certify;
 pub use reduction::{OrderErrorPoint, OrderReduction};
 pub use responses::error_response;
+pub(crate) use signal::{Columns, Signal};
 pub use sizing::Sizing;
+pub use tones::Tone;
+pub(crate) use tones::{ToneResponse, Worst};
 pub use warnings::warnings;
 
 use crate::bank::{Bank, Proof};

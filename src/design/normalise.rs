@@ -4,8 +4,9 @@ use super::DesignError;
 use super::covariances::Covariances;
 use super::problem::{Channel, Problem};
 use crate::analog::{StableFilter, StrictlyProper, signal};
-use crate::spec::{ConverterErrors, ErrorPoint, FilterSpec, Spec};
-use crate::units::GridTime;
+use crate::spec::{Band, ConverterErrors, ErrorPoint, FilterSpec, Spec};
+use crate::units::{GridTime, RadiansPerFastPeriod};
+use std::f64::consts::TAU;
 
 impl Problem {
     /// Normalises `spec` with the given latency (fast samples).
@@ -39,6 +40,7 @@ impl Problem {
             ratio,
             latency,
             signal,
+            band: band(spec),
             front_ends,
             target,
             channels,
@@ -114,6 +116,11 @@ impl Problem {
         let scaled = self.front_ends[front_end].with_cutoff_scaled(factor);
         intern(&mut self.front_ends, scaled)
     }
+}
+
+fn band(spec: &Spec) -> Option<[RadiansPerFastPeriod; 2]> {
+    let Band { low, high } = spec.signal.as_ref()?.band()?;
+    Some([low, high].map(|end| RadiansPerFastPeriod(TAU * end.per_fast_period(spec.fast_period).0)))
 }
 
 /// The power of an input of unit density at the target, over that of the signal in full scale: with it the

@@ -28,6 +28,9 @@ pub struct Problem {
     /// W, the filter of the signal: the front ends see white noise, or an input of bounded energy, through
     /// it. `None` stands for W = 1.
     pub signal: Option<StableFilter>,
+    /// The ends of the band of the signal, of which W is a model: mean squares are those for a flat spectrum
+    /// there. `None` stands for the spectrum |W|^2.
+    pub band: Option<[RadiansPerFastPeriod; 2]>,
     /// The distinct analog filters Phi. Channels whose filters are proportional share one filter and its
     /// state.
     pub front_ends: Vec<StrictlyProper>,
@@ -75,12 +78,6 @@ impl Problem {
         }
         self.latency -= fast_periods;
         self
-    }
-
-    /// States of the front ends and of the signal's filter.
-    pub fn analog_states(&self) -> usize {
-        let own = self.signal.as_ref().map_or(0, StableFilter::order);
-        own + self.front_ends.iter().map(|front_end| front_end.order()).sum::<usize>()
     }
 
     /// The response Phi W of the front end of this index, after the signal's filter.

@@ -23,30 +23,27 @@
 //! converters of 16 bits: without any noise one channel alone would be exact wherever the signal fits into
 //! it.
 
-mod band;
 mod integral;
 mod powers;
 mod reconstruction;
-mod signal;
+mod setup;
 mod simple;
 mod snr;
 mod spline;
 #[cfg(test)]
 mod tests;
-mod tones;
 
-pub use band::{BandSource, FigureBand, Setup};
+pub use crate::design::{BandSource, FigureBand, Tone};
+pub use setup::Setup;
 pub use simple::{Alone, SimpleFigure, SimpleWay};
 pub use snr::Snr;
-pub use tones::Tone;
 
 use crate::analog::resolved_band;
 use crate::bank::Bank;
-use crate::design::{DesignError, Deviations, LiftedPlant, Problem};
+use crate::design::{DesignError, Deviations, LiftedPlant, Problem, ToneResponse, Worst};
 use crate::spec::{Band, Spec};
 use crate::units::{CyclesPerFastPeriod, Decibels, Hertz};
 use snr::Setting;
-use tones::{ToneResponse, Worst};
 
 /// By how many decibels a bank must beat the simple ways to be worth its trouble.
 const LEAST_GAIN: Decibels = Decibels(1.0);
@@ -105,9 +102,9 @@ impl Figures {
         let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
         let plain = without_signal(spec, bank.latency)?;
         let band = FigureBand::new(spec, &plain);
-        let tones = ToneResponse::new(bank, plain.clone(), Deviations::of_spec(spec))?;
+        let tones = ToneResponse::new(&bank.filters, plain.clone(), Deviations::of_spec(spec))?;
         let Worst { image, gain_error, vanishes } = tones.worst(band.cycles(spec));
-        let setting = Setting::new(spec, bank.latency, &band)?;
+        let setting = Setting::new(spec, bank.latency)?;
         let ways = simple::ways(setting.problem());
         let ratios = setting.ratios(&ways);
         let own = setting.ratio_of_bank(bank)?;
@@ -147,8 +144,7 @@ impl Figures {
 /// As [`Figures::new`].
 pub fn snr(bank: &Bank) -> Result<Snr, DesignError> {
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
-    let band = FigureBand::new(spec, &without_signal(spec, bank.latency)?);
-    Ok(Setting::new(spec, bank.latency, &band)?.ratio_of_bank(bank)?.snr)
+    Ok(Setting::new(spec, bank.latency)?.ratio_of_bank(bank)?.snr)
 }
 
 /// The two figures that errors of the channels change most.
@@ -169,7 +165,8 @@ impl KeyFigures {
         let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
         let plain = without_signal(spec, bank.latency)?;
         let band = FigureBand::new(spec, &plain).cycles(spec);
-        let Worst { image, .. } = ToneResponse::new(bank, plain, Deviations::of_spec(spec))?.worst(band);
+        let Worst { image, .. } =
+            ToneResponse::new(&bank.filters, plain, Deviations::of_spec(spec))?.worst(band);
         let image_db = image.map(|tone| Decibels::of_amplitude(tone.image));
         Ok(Self { snr_db: snr(bank)?.total_db, image_db })
     }
@@ -198,7 +195,7 @@ pub fn tone_curve(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Tone)>, Desi
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
     let plain = without_signal(spec, bank.latency)?;
     let band = FigureBand::new(spec, &plain).cycles(spec);
-    let tones = ToneResponse::new(bank, plain, Deviations::of_spec(spec))?.curve(band, points);
+    let tones = ToneResponse::new(&bank.filters, plain, Deviations::of_spec(spec))?.curve(band, points);
     let hertz = |CyclesPerFastPeriod(f): CyclesPerFastPeriod| Hertz(f / spec.fast_period.0);
     Ok(tones.into_iter().map(|tone| (hertz(tone.frequency), tone)).collect())
 }

@@ -3,8 +3,7 @@
 
 use super::integral::mean_over_circle;
 use super::reconstruction::Reconstruction;
-use super::signal::{Columns, Signal};
-use crate::design::Deviations;
+use crate::design::{Columns, Deviations, Signal};
 use crate::linalg::{CMat, Complex};
 use std::ops::Range;
 
@@ -90,13 +89,10 @@ impl Conditions {
     }
 
     /// The mean squares of [`Powers`] at an angle without the offsets, summed over the M phases.
-    fn at(&self, way: &Reconstruction, theta: f64, columns: &Columns, late: Option<&Late>) -> [f64; 4] {
+    fn at(&self, way: &Reconstruction, theta: f64, columns: &Columns, late: Option<&Columns>) -> [f64; 4] {
         let filters = way.at(theta, columns, &self.noise);
-        let signal = error(columns, &filters, &columns.measurement);
-        let late = late.filter(|_| way.is_relative()).map_or(signal, |late| {
-            let beside = self.of_converters(|_, samples| power(&filters, &late.rest, samples));
-            error(columns, &filters, &late.mean) + beside
-        });
+        let signal = error(columns, &filters);
+        let late = late.filter(|_| way.is_relative()).map_or(signal, |late| error(late, &filters));
         let gains = self.of_converters(|spread, samples| match spread.gain {
             gain if gain > 0.0 && way.is_relative() => {
                 gain * gain * power(&filters, &columns.measurement, samples)
@@ -108,30 +104,16 @@ impl Conditions {
         [signal, late, gains, noise.sum()]
     }
 
-    /// The samples of delays that are off; `None` where all are exact.
-    fn late(&self, columns: &Columns) -> Option<Late> {
-        if self.spread.iter().all(|spread| spread.delay.0 == 0.0) {
-            return None;
-        }
-        let (mut mean, mut rest) = (columns.measurement.clone(), columns.measurement.clone());
-        for (spread, samples) in self.spread.iter().zip(self.signal.problem().converters()) {
-            for (k, &w) in columns.frequencies.iter().enumerate() {
-                let (chi, beside) = (spread.mean_phase(w), spread.phase_power(w).sqrt());
-                samples.clone().for_each(|i| {
-                    mean[(i, k)] *= chi;
-                    rest[(i, k)] *= beside;
-                });
-            }
-        }
-        Some(Late { mean, rest })
+    /// The columns with delays that are off; `None` where all are exact.
+    fn late(&self, columns: &Columns) -> Option<Columns> {
+        let delays: Vec<Deviations> = self
+            .spread
+            .iter()
+            .map(|spread| Deviations { delay: spread.delay, ..Deviations::default() })
+            .collect();
+        let are_exact = delays.iter().all(|spread| spread.delay.0 == 0.0);
+        (!are_exact).then(|| columns.clone().with_errors(self.signal.problem(), &delays))
     }
-}
-
-/// Samples of delays that are not known exactly.
-struct Late {
-    mean: CMat,
-    /// What each sample has beside its mean at each frequency.
-    rest: CMat,
 }
 
 /// The power at the output of what the samples of a converter have in common.
@@ -144,9 +126,9 @@ fn power(filters: &CMat, of: &CMat, samples: Range<usize>) -> f64 {
 }
 
 /// The squared Frobenius norm of W - F H, from amplitudes: nothing of size 1 is subtracted from a square.
-fn error(columns: &Columns, filters: &CMat, measurement: &CMat) -> f64 {
+fn error(columns: &Columns, filters: &CMat) -> f64 {
     let mut error = columns.reference.clone();
-    error.gemm(-Complex::ONE, filters, measurement, Complex::ONE);
+    error.gemm(-Complex::ONE, filters, &columns.measurement, Complex::ONE);
     error.norm_squared()
 }
 

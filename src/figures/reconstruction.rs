@@ -1,10 +1,9 @@
 //! Ways from slow samples to fast ones as the matrix F(theta) of their polyphase components: the filters of
 //! a bank, and the simple ways.
 
-use super::signal::Columns;
 use super::spline::Spline;
 use crate::design::filters::FilterResponse;
-use crate::design::{NearestSample, Problem, nearest_samples};
+use crate::design::{Columns, NearestSample, Problem, nearest_samples};
 use crate::linalg::{self, CMat, Complex};
 use std::ops::Range;
 

@@ -1,10 +1,9 @@
 //! The simple ways that a bank must beat, and whether one channel alone does as well as all of them.
 
-use super::band::FigureBand;
+use super::LEAST_GAIN;
 use super::reconstruction::Reconstruction;
 use super::snr::{Ratios, Setting};
 use super::spline::Spline;
-use super::{LEAST_GAIN, without_signal};
 use crate::design::{DesignError, Problem};
 use crate::spec::Spec;
 use crate::units::Decibels;
@@ -117,8 +116,7 @@ impl Alone {
     /// As [`crate::design::Problem::new`].
     pub fn new(spec: &Spec) -> Result<Self, DesignError> {
         let spec = Spec { uncertainty: None, ..spec.clone() };
-        let band = FigureBand::new(&spec, &without_signal(&spec, 0)?);
-        let setting = Setting::new(&spec, 0, &band)?;
+        let setting = Setting::new(&spec, 0)?;
         let channels = kinds(setting.problem());
         let way = |converter, samples| Reconstruction::OneChannel { converter, samples };
         let alone = channels.iter().map(|(converter, samples)| way(*converter, samples.clone()));

@@ -1,16 +1,12 @@
 //! The signal-to-noise ratio with its parts.
 
-use super::band::FigureBand;
 use super::powers::{Conditions, Powers, target_power};
 use super::reconstruction::Reconstruction;
-use super::signal::Signal;
-use super::without_signal;
 use crate::bank::Bank;
 use crate::design::filters::FilterResponse;
-use crate::design::{DesignError, Deviations, Problem};
-use crate::spec::{SignalSpectrum, Spec, USUAL_RMS};
+use crate::design::{DesignError, Deviations, Problem, Signal};
+use crate::spec::{Spec, USUAL_RMS};
 use crate::units::Decibels;
-use std::f64::consts::TAU;
 
 /// Variance of the rounding to 16 bits of a full scale from -1 to 1: step^2 / 12.
 const ROUNDING_16_BITS: f64 = 1.0 / (12.0 * (1u64 << 30) as f64);
@@ -62,19 +58,11 @@ impl Setting {
     ///
     /// # Errors
     /// As [`Problem::new`].
-    pub(super) fn new(spec: &Spec, latency: usize, band: &FigureBand) -> Result<Self, DesignError> {
-        let plain = without_signal(spec, latency)?;
+    pub(super) fn new(spec: &Spec, latency: usize) -> Result<Self, DesignError> {
         let stated: Vec<f64> = spec.channels.iter().map(|channel| channel.sample_noise().powi(2)).collect();
         let stated = spec.layout().each(&stated);
         let jitter = Problem::jitter_shares(spec, latency)?;
-        let signal = match spec.signal.as_ref().map(|signal| &signal.spectrum) {
-            Some(SignalSpectrum::Band(_)) => {
-                let [low, high] = band.cycles(spec).map(|f| TAU * f.0);
-                Signal::in_band(plain, low..=high)
-            }
-            Some(SignalSpectrum::Filter(_)) => Signal::everywhere(Problem::new(spec, latency)?),
-            None => Signal::everywhere(plain),
-        };
+        let signal = Signal::of(&Problem::new(spec, latency)?);
         let target = target_power(&signal);
         let rms = spec.signal.as_ref().map(|signal| signal.rms);
         let noise_is_stated = stated.iter().chain(&jitter).any(|power| *power > 0.0);

@@ -35,6 +35,7 @@ fn case(ratio: usize, latency: usize, front_ends: &[FilterSpec], channels: &[(us
         latency,
         wait: 0,
         signal: None,
+        band: None,
         front_ends: front_ends.iter().map(filter).collect(),
         target: 0,
         channels: channels

@@ -100,11 +100,13 @@ fn audited(seed: u64) -> Tally {
     let count = taps.unwrap_or(range + MEMORY);
     let errors = errors(&plant, count, noise, range);
     let best = errors.iter().copied().fold(f64::INFINITY, f64::min);
-    let shorter = errors[..chosen].iter().position(|error| *error <= best * (1.0 + WORTHWHILE - COMPARED));
-    if errors[chosen] > best * (1.0 + WORTHWHILE + COMPARED) || shorter.is_some() {
+    // FIR banks take the latency of the least error.
+    let worthwhile = if taps.is_some() { 0.0 } else { WORTHWHILE };
+    let shorter = errors[..chosen].iter().position(|error| *error <= best * (1.0 + worthwhile - COMPARED));
+    if errors[chosen] > best * (1.0 + worthwhile + COMPARED) || shorter.is_some() {
         let at = errors.iter().position(|error| *error == best);
         tally.refuted.push(format!(
-            "{name}: chosen {chosen} with {:.6e}; best {best:.6e} at {at:?}; first within 0.1 dB before it {shorter:?}",
+            "{name}: chosen {chosen} with {:.6e}; best {best:.6e} at {at:?}; first as good before it {shorter:?}",
             errors[chosen]
         ));
     }
@@ -113,6 +115,6 @@ fn audited(seed: u64) -> Tally {
 }
 
 #[test]
-fn chosen_latencies_are_the_shortest_within_a_tenth_of_a_decibel() {
+fn chosen_latencies_are_the_best() {
     campaign(PLANTS, "chosen latencies", audited);
 }

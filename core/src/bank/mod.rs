@@ -153,7 +153,7 @@ impl Bank {
         let mut spec = self.spec.clone()?;
         spec.latency = Some(self.latency);
         if let SynthesisFilters::Fir(taps) = &self.filters {
-            (spec.design.taps, spec.design.target_snr_db) = (taps.first().map(Vec::len), None);
+            spec.design = spec.design.with_taps(taps.first().map(Vec::len));
         }
         if let Some(words) = self.fixed_point.as_ref().filter(|_| spec.design.loss_db.is_some()) {
             (spec.design.bits, spec.design.loss_db) = (Some(words.bits.clone()), None);

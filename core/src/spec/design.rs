@@ -36,6 +36,9 @@ pub struct DesignTable<M> {
     /// The SNR in decibels for which the fewest taps are chosen, in place of `taps`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_snr_db: Option<f64>,
+    /// The same for the distance of the largest image of a tone in decibels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_sfdr_db: Option<f64>,
     /// Relative excess over the optimal gamma that the designer may spend on a smaller mean-square error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gamma_margin: Option<f64>,
@@ -83,11 +86,12 @@ struct Key {
 }
 
 /// The keys that not every method reads.
-const KEYS: [Key; 8] = {
+const KEYS: [Key; 9] = {
     use Method::{Fir, H2, Iir, Separation, Sinc};
     [
         Key { name: "taps", methods: &[Fir, H2, Sinc, Separation], advised: "fir or h2" },
         Key { name: "target_snr_db", methods: &[Fir, H2], advised: "fir or h2" },
+        Key { name: "target_sfdr_db", methods: &[Fir, H2], advised: "fir or h2" },
         Key { name: "gamma_margin", methods: &[Fir, Iir], advised: "fir or iir" },
         Key { name: "bits", methods: &[Fir], advised: "fir" },
         Key { name: "fraction_bits", methods: &[Fir], advised: "fir" },
@@ -131,6 +135,7 @@ impl<M> DesignTable<M> {
             method,
             taps: self.taps,
             target_snr_db: self.target_snr_db,
+            target_sfdr_db: self.target_sfdr_db,
             gamma_margin: self.gamma_margin,
             bits: self.bits,
             fraction_bits: self.fraction_bits,
@@ -139,6 +144,11 @@ impl<M> DesignTable<M> {
             reduction_loss_db: self.reduction_loss_db,
             noise: self.noise,
         }
+    }
+
+    /// Whether the number of taps, or what it follows from, is given.
+    fn is_sized(&self) -> bool {
+        self.taps.is_some() || self.target_snr_db.is_some() || self.target_sfdr_db.is_some()
     }
 
     /// The order reduction that is asked for.
@@ -157,8 +167,12 @@ impl<M: Serialize> DesignTable<M> {
 impl DesignSpec {
     /// Whether the filters are FIR, not recursive.
     pub fn is_fir(&self) -> bool {
-        let asks_for_taps = self.taps.is_some() || self.target_snr_db.is_some();
-        self.method.has_taps() || (self.method.reads("taps") && asks_for_taps)
+        self.method.has_taps() || (self.method.reads("taps") && self.is_sized())
+    }
+
+    /// The same with so many taps in place of what their number follows from.
+    pub fn with_taps(self, taps: Option<usize>) -> Self {
+        Self { taps, target_snr_db: None, target_sfdr_db: None, ..self }
     }
 
     /// Whether the taps are integers.
@@ -184,6 +198,7 @@ impl DesignSpec {
         self.check_keys()?;
         match (self.method, self.taps) {
             (Method::Fir, Some(taps)) => limits::check_optimised_taps(taps, layout.count()).at("taps"),
+            (Method::H2, Some(taps)) => limits::check_samples_seen(taps, layout).at("taps"),
             _ => Ok(()),
         }
     }
@@ -196,7 +211,8 @@ impl DesignSpec {
         self.fraction_bits.map_or(Ok(()), check_fraction_bits).at("fraction_bits")?;
         self.bits.as_ref().map_or(Ok(()), |bits| bits.check(self.taps)).at("bits")?;
         self.loss_db.map_or(Ok(()), limits::check_word_loss).at("loss_db")?;
-        self.target_snr_db.map_or(Ok(()), limits::check_target_snr).at("target_snr_db")
+        self.target_snr_db.map_or(Ok(()), limits::check_target_snr).at("target_snr_db")?;
+        self.target_sfdr_db.map_or(Ok(()), limits::check_target_sfdr).at("target_sfdr_db")
     }
 
     /// The keys that the method does not read, and those that need another one.
@@ -232,6 +248,16 @@ impl DesignSpec {
                 first: "taps",
                 second: "target_snr_db",
                 remedy: "the SNR decides how many taps there are, keep one of them",
+            },
+            Pair {
+                first: "taps",
+                second: "target_sfdr_db",
+                remedy: "the SFDR decides how many taps there are, keep one of them",
+            },
+            Pair {
+                first: "target_snr_db",
+                second: "target_sfdr_db",
+                remedy: "each decides how many taps there are, keep one of them",
             },
         ];
         pairs.into_iter().try_for_each(|pair| {
@@ -274,13 +300,16 @@ impl DesignOverrides {
         let new = self.method.filter(|method| file.method != Some(*method));
         let keeps = |key: &str| new.is_none_or(|method| method.reads(key));
         let keeps_taps = new.is_none_or(Method::has_taps);
+        let is_sized = self.is_sized();
+        let keeps_size = |key: &str| keeps(key) && !is_sized;
         Self {
             method: self.method.or(file.method),
             // Each stands in place of the other.
-            taps: self.taps.or(file.taps.filter(|_| keeps_taps && self.target_snr_db.is_none())),
-            target_snr_db: self
-                .target_snr_db
-                .or(file.target_snr_db.filter(|_| keeps("target_snr_db") && self.taps.is_none())),
+            taps: self.taps.or(file.taps.filter(|_| keeps_taps && !is_sized)),
+            target_snr_db: self.target_snr_db.or(file.target_snr_db.filter(|_| keeps_size("target_snr_db"))),
+            target_sfdr_db: self
+                .target_sfdr_db
+                .or(file.target_sfdr_db.filter(|_| keeps_size("target_sfdr_db"))),
             gamma_margin: self.gamma_margin.or(file.gamma_margin.filter(|_| keeps("gamma_margin"))),
             bits: self.bits.or(file.bits.filter(|_| keeps("bits"))),
             fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| keeps("fraction_bits"))),
@@ -301,10 +330,9 @@ impl DesignOverrides {
         if self.gives(cause) { error.of_override(cause) } else { error }
     }
 
-    /// The default method is FIR if taps or an SNR are given, else IIR, which needs no size.
+    /// The default method is FIR if taps or a figure are given, else IIR, which needs no size.
     pub(super) fn resolved(self) -> DesignSpec {
-        let is_sized = self.taps.is_some() || self.target_snr_db.is_some();
-        let method = self.method.unwrap_or(if is_sized { Method::Fir } else { Method::Iir });
+        let method = self.method.unwrap_or(if self.is_sized() { Method::Fir } else { Method::Iir });
         Self { noise: None, ..self }.with(method)
     }
 }

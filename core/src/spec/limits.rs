@@ -1,6 +1,6 @@
 //! Ranges of the numbers in a spec, each with its reason.
 
-use super::SpecProblem;
+use super::{FrameLayout, SpecProblem};
 use crate::units::{FastPeriods, Hertz, Seconds};
 use std::ops::RangeInclusive;
 
@@ -32,8 +32,12 @@ pub const MAX_LATENCY: usize = 65_536;
 /// Largest order of a spec; banks of the designer have fewer states.
 pub const MAX_STATES: usize = 65_536;
 
-/// Largest SNR that can be asked for: doubles have no more.
-pub const MAX_TARGET_SNR_DB: f64 = 300.0;
+/// Most samples of all channels that an output sample of the method `h2` with taps sees: the least squares
+/// take a gigabyte at this size.
+const MAX_SAMPLES_SEEN: usize = 2048;
+
+/// Largest SNR or SFDR that can be asked for: doubles have no more.
+pub const MAX_TARGET_DB: f64 = 300.0;
 
 /// Largest loss by order reduction of a spec; a larger one would leave no state.
 pub const MAX_REDUCTION_LOSS_DB: f64 = 400.0;
@@ -137,6 +141,16 @@ pub(crate) fn check_optimised_taps(taps: usize, channels: usize) -> Result<(), S
     within(taps.saturating_mul(channels) as f64, 0.0..=MAX_OPTIMISED_TAPS as f64, "taps in all", rule)
 }
 
+/// Samples of the frames that the taps of an output sample reach.
+pub(super) fn check_samples_seen(taps: usize, layout: &FrameLayout) -> Result<(), SpecProblem> {
+    let seen = taps.div_ceil(layout.ratio()).saturating_mul(layout.count());
+    let rule = format!(
+        "the taps of one output sample reach at most {MAX_SAMPLES_SEEN} samples of all channels for the method h2; use fewer \
+         taps, or h2 without taps"
+    );
+    within(seen as f64, 0.0..=MAX_SAMPLES_SEEN as f64, "samples", rule)
+}
+
 /// sigma_i, the rms of a converter's noise.
 ///
 /// # Errors
@@ -197,10 +211,18 @@ pub(crate) fn check_order(order: usize) -> Result<(), SpecProblem> {
 /// The SNR for which taps are chosen.
 pub(super) fn check_target_snr(db: f64) -> Result<(), SpecProblem> {
     let rule = format!(
-        "target_snr_db is the ratio of the signal to error and noise together, 0 to {MAX_TARGET_SNR_DB} dB; 90 is that of \
+        "target_snr_db is the ratio of the signal to error and noise together, 0 to {MAX_TARGET_DB} dB; 90 is that of \
          15 bits"
     );
-    within(db, 0.0..=MAX_TARGET_SNR_DB, "dB", rule)
+    within(db, 0.0..=MAX_TARGET_DB, "dB", rule)
+}
+
+/// The SFDR for which taps are chosen.
+pub(super) fn check_target_sfdr(db: f64) -> Result<(), SpecProblem> {
+    let rule = format!(
+        "target_sfdr_db is the distance of the largest image of a tone in the band, 0 to {MAX_TARGET_DB} dB"
+    );
+    within(db, 0.0..=MAX_TARGET_DB, "dB", rule)
 }
 
 /// Decibels that order reduction may lose.

@@ -38,7 +38,7 @@ pub use fitting::{Cutoff, Fitting, UnknownFitting};
 pub use frames::{FrameLayout, FrameSample};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS};
 pub(crate) use limits::{MAX_ENTRY, check_channel_count, check_fast_period, check_gain, check_ratio};
-pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES, MAX_TARGET_SNR_DB};
+pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES, MAX_TARGET_DB};
 pub use limits::{check_noise, check_offset, within};
 pub use one_or_each::OneOrEach;
 pub use passband::Passband;

@@ -8,41 +8,6 @@ fn problem(filters: &str) -> Problem {
     Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), 0).unwrap()
 }
 
-/// One pole p: c(t) = (p / 2) e^{-p |t|}, whose Gaussian average is a sum of two error functions. Here by
-/// the frequency: (1 / pi) int_0^inf |Phi|^2 chi cos(w t) dw with the trapezoidal rule, which is exact for
-/// such a decaying smooth function up to its aliases.
-#[test]
-fn averages_multiply_the_spectrum_by_the_characteristic_function() {
-    let text = "{ delay = 0, filter = { family = \"butterworth\", order = 3, cutoff = 0.2 } }, \
-                { delay = 0, filter = { zeros = [[0, 0]], poles = [[-0.3, 5], [-0.3, -5]], gain = 0.7 } }, \
-                { delay = 0, filter = { num = [40], den = [1, 40] } }";
-    let problem = problem(text);
-    let covariances = Covariances::new(&problem).unwrap();
-    let response = |i: usize, w: f64| problem.response(i, crate::units::RadiansPerFastPeriod(w));
-    for deviation in [0.05, 0.7, 3.0] {
-        let averaged = covariances.averaged(FastPeriods(deviation));
-        let (step, most) = (1e-3, 9.0 / deviation);
-        for (a, b) in [(0, 0), (1, 2), (2, 1), (2, 2), (3, 3), (3, 0), (0, 3)] {
-            for t in [-40.0, -3.3, -0.4, 0.0, 0.1, 2.7, 30.0] {
-                let term = |k: usize| {
-                    let w = step * k as f64;
-                    let cross = response(a, w) * response(b, w).conj() * Complex::from_polar(1.0, w * t);
-                    let half = if k == 0 { 0.5 } else { 1.0 };
-                    half * cross.re * (-0.5 * (w * deviation).powi(2)).exp()
-                };
-                let count = (most / step) as usize;
-                let expected = (0..count).map(term).sum::<f64>() * step / std::f64::consts::PI;
-                let scale = (covariances.power(a) * covariances.power(b)).sqrt();
-                let found = averaged.at(a, b, t);
-                assert!(
-                    (found - expected).abs() < 1e-10 * scale,
-                    "{deviation} {a} {b} {t}: {found} {expected}"
-                );
-            }
-        }
-    }
-}
-
 #[test]
 fn jitter_is_the_slope_times_the_deviation_where_there_is_a_slope() {
     let problem = problem("{ delay = 0, filter = { family = \"butterworth\", order = 2, cutoff = 0.1 } }");

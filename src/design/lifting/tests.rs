@@ -18,6 +18,7 @@ fn one_pole(poles: &[f64], ratio: usize, latency: usize, channels: &[(usize, f64
         ratio,
         latency,
         signal: None,
+        band: None,
         front_ends: poles.iter().map(filter).collect(),
         target: 0,
         channels: channels

@@ -8,7 +8,7 @@ use crate::linalg::{self, LinalgError, Mat};
 use crate::lti::gramian::controllability_root;
 use crate::lti::riccati::{RiccatiSolution, solve_doubling};
 use crate::lti::{LtiError, StateSpace};
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::rc::Rc;
 
 /// A feedthrough below this fraction of its measurement is a rounding error: the channel adds no
@@ -41,7 +41,7 @@ const CLEARLY_NEGATIVE: f64 = 1e-5;
 /// of Q compensates exactly. P0 decreases along the chain, which keeps Q positive at the last state;
 /// otherwise the doubling algorithm would break down on its first step.
 #[derive(Debug, Clone)]
-pub(super) struct Innovations {
+pub(in crate::design) struct Innovations {
     f: Mat,
     b1: Mat,
     b2: Mat,
@@ -112,7 +112,7 @@ impl RiccatiSolver for Innovations {
 impl Innovations {
     /// The problem in balanced coordinates, if they exist, and in those of the plant. Near the limits of
     /// double precision sometimes only one of the two can be solved.
-    pub(super) fn in_all_coordinates(plant: &LiftedPlant) -> Result<Vec<Rc<Self>>, DesignError> {
+    pub(in crate::design) fn in_all_coordinates(plant: &LiftedPlant) -> Result<Vec<Rc<Self>>, DesignError> {
         let plain = Self::new(plant)?;
         Ok(plain.balanced().into_iter().chain([plain]).map(Rc::new).collect())
     }
@@ -242,6 +242,42 @@ impl Innovations {
         let g = self.c2.transpose() * &self.c2;
         let h = &self.b2 * self.b2.transpose() + self.shift_of_q();
         Some(solve_doubling(&self.f.transpose(), &g, &h)?.x + &self.p0)
+    }
+
+    /// Mean squares of the errors of the references with the measurements up to their own slow period, and
+    /// with those of `periods.start()` to `periods.end()` further ones: it ends where the second half of them
+    /// lowered no square by more than the share `negligible`. `None` if the Riccati equation could not be
+    /// solved.
+    pub(in crate::design) fn smoothed(
+        &self,
+        periods: RangeInclusive<usize>,
+        negligible: f64,
+    ) -> Option<Vec<Vec<f64>>> {
+        let p = self.mean_square_covariance()?;
+        let root = linalg::cholesky(&self.innovation(&p)).ok()?;
+        // Of the state with the innovations of unit variance.
+        let pc = &p * linalg::solve_lower(&root, &self.c2).transpose();
+        let unit = linalg::solve_lower(&root, &self.c2);
+        let mut gain = &self.c1 * &pc;
+        let prior =
+            |k: usize| (self.c1.row(k) * &p * self.c1.row(k).transpose())[0] + self.y.row(k).norm_squared();
+        let mut squares: Vec<f64> =
+            (0..self.c1.nrows()).map(|k| prior(k) - gain.row(k).norm_squared()).collect();
+        // Of the errors of the references with that of the state.
+        let mut cross =
+            (&self.c1 * &p - &gain * pc.transpose()) * self.f.transpose() + &self.y * self.b2.transpose();
+        let mut all = vec![squares.clone()];
+        for period in 1..=*periods.end() {
+            gain = &cross * unit.transpose();
+            squares.iter_mut().zip(gain.row_iter()).for_each(|(square, row)| *square -= row.norm_squared());
+            all.push(squares.clone());
+            let is_settled = |(before, after): (&f64, &f64)| before - after <= negligible * after;
+            if period > *periods.start() && all[period / 2].iter().zip(&squares).all(is_settled) {
+                break;
+            }
+            cross = (cross - &gain * pc.transpose()) * self.f.transpose();
+        }
+        Some(all)
     }
 
     /// E = gamma^2 I - Y Y'; a filter needs it positive.

@@ -5,14 +5,12 @@
 //! | [`fir`] | the norm of the error, for given length (thesis 5.4) | FIR | dual of the sampled problem |
 //! | [`iir`] | the norm of the error (thesis 5.3) | state space | unsolvable Riccati equation |
 //! | [`h2`] | the mean-square error: `iir` at gamma = infinity | state space | noncausal bound |
-//! | [`mean_square_fir`] | the same, for given length: `h2` with taps | FIR | noncausal bound |
-//! | [`averaged_fir`] | the same on average over uncertain delays and gains | FIR | noncausal bound |
+//! | [`mean_square_fir`] | the same, for given length, and on average over errors of the converters: `h2` with taps | FIR | noncausal bound |
 //! | [`comparison::sinc`] | nothing: Yen's interpolation, truncated (thesis 5.6.3) | FIR | noncausal bound |
 //! | [`comparison::separation`] | delays and bank one after the other (thesis 5.6.3) | FIR | noncausal bound |
 
-mod averaged_fir;
 mod comparison;
-mod filtering;
+pub(super) mod filtering;
 pub(crate) mod fir;
 mod gamma_iteration;
 pub(crate) mod h2;
@@ -22,14 +20,14 @@ mod precise_filtering;
 pub(crate) mod robust_fir;
 
 use super::DesignError;
+use super::deviations::Deviations;
 pub(crate) use super::exchange::GAMMA_ACCURACY;
 use super::limits::Stop;
 use super::plant::LiftedPlant;
 use super::problem::Problem;
 use crate::bank::SynthesisFilters;
 use crate::lti::peak::Peak;
-use crate::spec::{ErrorBox, Method, Spec};
-use crate::units::FastPeriods;
+use crate::spec::{ErrorBox, Method};
 
 /// Settings of a method, in addition to the plant.
 #[derive(Debug, Clone, Default)]
@@ -41,44 +39,12 @@ pub(crate) struct Settings {
     pub(crate) gamma_margin: Option<f64>,
     /// The errors that `fir` has to expect; `None` if there are none.
     pub(crate) robust: Option<ErrorBox>,
-    /// For mean-square designs, how well each converter is known; `None` if all are exact.
-    pub(crate) deviations: Option<Vec<Deviations>>,
+    /// For mean-square designs, how well each converter is known; none if all are exact.
+    pub(crate) deviations: Vec<Deviations>,
     /// Ends the search with the best filters so far.
     pub(crate) stop: Stop,
     /// The channels of the plant in units of the slow period, for `separation`.
     pub(crate) at_slow_rate: Option<Problem>,
-}
-
-/// Standard deviations of the errors of a converter, which are Gaussian and constant while a recording
-/// lasts.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct Deviations {
-    pub(crate) delay: FastPeriods,
-    /// As a share of the gain.
-    pub(crate) gain: f64,
-    /// Of full scale, or in the scale of a signal.
-    pub(crate) offset: f64,
-}
-
-impl Deviations {
-    /// Of the converters of a spec, by its `[uncertainty]`.
-    pub(crate) fn of_spec(spec: &Spec) -> Vec<Self> {
-        let (table, count) = (spec.uncertainty.clone().unwrap_or_default(), spec.channels.len());
-        let (delays, gains) = (table.delay_deviations(count), table.gain_deviations(count));
-        let offsets = table.offset_deviations(count);
-        let of = |i: usize| {
-            let delay = delays[i].in_fast_periods(spec.fast_period);
-            Self { delay, gain: gains[i], offset: offsets[i] }
-        };
-        (0..count).map(of).collect()
-    }
-
-    /// Of the converters of `spec`, for a method that averages over them; `None` if all are exact.
-    pub(super) fn averaged_over(spec: &Spec) -> Option<Vec<Self>> {
-        let all = Self::of_spec(spec);
-        let uncertain = all.iter().any(|deviations| deviations.delay.0 > 0.0 || deviations.gain > 0.0);
-        (spec.design.method == Method::H2 && uncertain).then_some(all)
-    }
 }
 
 /// The result of a method.
@@ -144,10 +110,7 @@ pub(crate) fn synthesise(
     match method {
         Method::Fir => fir::synthesise(plant, settings),
         Method::Iir => iir::synthesise(plant, settings),
-        Method::H2 if settings.taps > 0 => match &settings.deviations {
-            Some(deviations) => averaged_fir::synthesise(plant, settings.taps, deviations),
-            None => mean_square_fir::synthesise(plant, settings),
-        },
+        Method::H2 if settings.taps > 0 => mean_square_fir::synthesise(plant, settings),
         Method::H2 => h2::synthesise(plant, &settings.stop),
         Method::Sinc => comparison::sinc(plant, settings),
         Method::Separation => comparison::separation(plant, settings),

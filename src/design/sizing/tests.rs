@@ -1,8 +1,9 @@
 use super::*;
-use crate::design::history_errors::{HistoryErrors, best_taps};
-use crate::design::least_errors::shortest;
+use crate::design::fir_errors::FirErrors;
+use crate::design::length::Figure;
+use crate::design::root_covariance::RootCovariance;
 use crate::lmi::sampled;
-use crate::spec::DesignSpec;
+use crate::spec::{DesignSpec, FilterSpec};
 
 /// The problem of a spec in normalised time with the same filter everywhere.
 fn problem(filter: &str, ratio: usize, delays: &[f64]) -> Problem {
@@ -41,26 +42,28 @@ const STEEP: &str = r#"{ family = "butterworth", order = 6, cutoff = 0.12 }"#;
 /// determine the best estimate.
 #[test]
 fn one_pole_has_closed_forms() {
+    /// Of the power of one pole, what aliases beyond eight fast rates that stand for others miss.
+    const MISSED: f64 = 5e-3;
     let p = 0.3;
     let problem = problem("{ num = [0.3], den = [1.0, 0.3] }", 4, &[1.5]);
     // Samples at -1.5, -5.5, -9.5.
-    let errors = HistoryErrors::new(&problem, 3, -30..=6).unwrap();
+    let errors = RootCovariance::new(&problem, &[], 3, -30..=6);
     let power = 0.5 * p;
-    assert!((errors.power / power - 1.0).abs() < 1e-12);
+    assert!((errors.power / power - 1.0).abs() < MISSED);
     let apart = |t: f64| power * (1.0 - (-2.0 * p * t).exp());
     for ahead in 0..=6 {
         let exact = apart(ahead as f64 + 1.5);
-        assert!((errors.at(ahead) / exact - 1.0).abs() < 1e-5, "{ahead}");
+        assert!((errors.error(3, ahead) - exact).abs() < MISSED * power, "{ahead}");
     }
     for before in 0..20 {
         let exact = apart(before as f64 + 0.5);
-        assert!((errors.at(-10 - before) / exact - 1.0).abs() < 1e-5, "{before}");
+        assert!((errors.error(3, -10 - before) - exact).abs() < MISSED * power, "{before}");
     }
     // Between two samples, a and b away.
     for (instant, a, b) in [(-2, 3.5, 0.5), (-4, 1.5, 2.5), (-7, 2.5, 1.5)] {
         let (u, v) = ((-p * a).exp(), (-p * b).exp());
         let exact = power * (1.0 - u * u) * (1.0 - v * v) / (1.0 - u * u * v * v);
-        assert!((errors.at(instant) / exact - 1.0).abs() < 1e-5, "{instant}: {exact}");
+        assert!((errors.error(3, instant) - exact).abs() < MISSED * power, "{instant}: {exact}");
     }
 }
 
@@ -77,10 +80,10 @@ fn the_errors_are_those_of_the_least_squares_taps() {
             let mut problem = problem(filter, ratio, &delays);
             problem.noise = (0..delays.len()).map(|i| (noise * (1.0 + i as f64)).powi(2)).collect();
             problem.channels[0].gain = -1.5;
-            let reach = LeastErrors::new(&problem, taps, 0..=taps + 6).unwrap();
+            let reach = FirErrors::new(&problem, &[], taps + 2, 0..=taps + 6);
             for latency in 0..=taps + 6 {
                 let expected = least_mean_square(&problem, latency, taps).sqrt();
-                let found = reach.rms(latency);
+                let found = reach.square(BankSize { taps, latency }).sqrt();
                 let close = (found - expected).abs() < 1e-5 * expected + 1e-9;
                 assert!(close, "noise {noise}, latency {latency}: {found} {expected}");
             }
@@ -112,23 +115,19 @@ fn spec(design: &str) -> Spec {
     Spec::from_toml(&text, "spec.toml").unwrap()
 }
 
-/// The whole error of the mean-square optimum of a spec, in double precision and without a smoother.
+/// The whole error of the mean-square optimum of a spec, on another route.
 fn whole(spec: &Spec, latency: usize, taps: usize) -> f64 {
-    least_mean_square(&Problem::new(&with_usual_noise(spec), latency).unwrap(), latency, taps).sqrt()
+    least_mean_square(&Problem::new(spec, latency).unwrap(), latency, taps).sqrt()
 }
 
 #[test]
-fn the_latency_is_the_shortest_within_a_tenth_of_a_decibel() {
+fn the_latency_is_that_of_the_least_error() {
     for design in ["method = \"fir\", taps = 16", "method = \"h2\", taps = 16", "taps = 16, noise = 1e-2"] {
         let spec = spec(design);
         let errors: Vec<f64> = (0..20).map(|latency| whole(&spec, latency, 16)).collect();
         let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
         let chosen = latency(&spec).unwrap();
-        assert!(errors[chosen] < 1.0117 * least, "{design}: {chosen} {errors:?}");
-        assert!(
-            errors[..chosen].iter().all(|error| *error > 1.0115 * least),
-            "{design}: {chosen} {errors:?}"
-        );
+        assert!(errors[chosen] <= least * (1.0 + 1e-6), "{design}: {chosen} {errors:?}");
     }
 }
 
@@ -151,7 +150,7 @@ fn as_many_taps_are_chosen_as_the_snr_needs() {
         let Sizing { taps, .. } = Sizing::of(&open).unwrap();
         let found = |taps: usize| {
             let problem = Problem::new(&open, 9).unwrap();
-            let power = HistoryErrors::new(&problem, 1, 0..=0).unwrap().power;
+            let power = RootCovariance::new(&problem, &[], 1, 0..=0).power;
             10.0 * (power / least_mean_square(&problem, 9, taps)).log10()
         };
         assert!(
@@ -167,7 +166,9 @@ fn as_many_taps_are_chosen_as_the_snr_needs() {
 fn an_snr_that_is_out_of_reach_is_refused_with_the_best_one() {
     let open = Spec { latency: Some(9), ..spec("target_snr_db = 200, method = \"h2\", noise = 1e-3") };
     let refused = Sizing::of(&open).unwrap_err();
-    let DesignError::SnrOutOfReach { wanted, best, latency } = refused else { panic!("{refused}") };
+    let DesignError::FigureOutOfReach { figure: Figure::Snr, wanted, best, latency } = refused else {
+        panic!("{refused}")
+    };
     assert!(wanted == 200.0 && latency == 9 && (30.0..70.0).contains(&best), "{refused}");
 }
 
@@ -179,17 +180,19 @@ fn an_snr_that_banks_of_least_gamma_miss_is_refused_in_words() {
         let design = format!("method = \"fir\", target_snr_db = {snr:?}, noise = 1e-2");
         Sizing::of(&Spec { latency: Some(9), ..spec(&design) }).unwrap_err()
     };
-    let DesignError::SnrOutOfReach { best: most, .. } = open(200.0) else { panic!("200 dB are reached") };
+    let DesignError::FigureOutOfReach { best: most, .. } = open(200.0) else { panic!("200 dB are reached") };
     let refused = open(most - 0.01);
-    let DesignError::SnrMissed { wanted, best, .. } = refused else { panic!("{refused}") };
+    let DesignError::FigureMissed { wanted, best, .. } = refused else { panic!("{refused}") };
     assert!(best < wanted && best > most - 10.0, "{refused}");
 }
 
+/// Where images do not fall below the noise, because the front ends let everything pass.
 #[test]
 fn taps_that_are_left_open_are_almost_as_good_as_any() {
-    for (design, channels) in [("method = \"fir\"", 1), ("method = \"fir\", noise = 1e-3", 2)] {
+    for design in ["method = \"fir\"", "method = \"fir\", noise = 1e-5"] {
         let mut open = spec(design);
-        open.channels.truncate(channels);
+        open.target = FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] };
+        open.channels.iter_mut().for_each(|channel| channel.filter = open.target.clone());
         let Sizing { latency, taps, .. } = Sizing::of(&open).unwrap();
         // Over all latencies: those far from the chosen one are worse.
         let least = |taps: usize, latencies: std::ops::RangeInclusive<usize>| {
@@ -199,60 +202,48 @@ fn taps_that_are_left_open_are_almost_as_good_as_any() {
         let near = latency.saturating_sub(6)..=latency + 8;
         let (enough, fewer) = (least(taps, near.clone()), least(taps - 1, near));
         assert!(enough <= 1.0105 * best && fewer > 1.0095 * best, "{taps} taps: {enough} {fewer} {best}");
-        assert!(whole(&open, latency, taps) <= 1.0117 * enough, "{latency}");
+        assert!(whole(&open, latency, taps) <= (1.0 + 1e-6) * enough, "{latency}");
     }
 }
 
-/// The latencies of banks for a signal in a band, against the whole errors of banks of 48 taps at every
-/// latency as the lifted plant has them.
-#[test]
-fn signals_in_a_band_get_the_latency_that_their_samples_need() {
-    struct System {
-        latency: usize,
-        ratio: usize,
-        band: f64,
-        filter: &'static str,
-        delays: &'static [f64],
-    }
-    let (fourth, second) = (
-        "family = \"butterworth\", order = 4, cutoff = 0.1875",
-        "family = \"butterworth\", order = 2, cutoff = 0.4167",
+/// Two converters with a band, whose images depend on the length.
+fn in_band(design: &str) -> Spec {
+    let text = format!(
+        "fast_period = 1.0\nratio = 2\nsignal = {{ band = 0.4 }}\n\
+         target = {{ filter = {{ family = \"butterworth\", order = 2, cutoff = 0.4167 }} }}\n\
+         channel = [{{ delay = 1.2 }}, {{ delay = 0.6 }}]\ndesign = {{ method = \"h2\", {design} }}\n"
     );
-    let systems = [
-        System { latency: 12, ratio: 2, band: 1.0 / 6.0, filter: fourth, delays: &[1.2, 0.6] },
-        System { latency: 22, ratio: 2, band: 0.4167, filter: second, delays: &[1.2, 0.6] },
-        System { latency: 19, ratio: 4, band: 0.375, filter: second, delays: &[2.7, 1.9, 1.1, 0.2] },
-        System {
-            latency: 7,
-            ratio: 2,
-            band: 0.425,
-            filter: "family = \"rc\", cutoff = 0.6",
-            delays: &[1.3, 0.8, 0.1],
-        },
-    ];
-    for System { latency: expected, ratio, band, filter, delays } in systems {
-        let channels: Vec<String> = delays.iter().map(|delay| format!("{{ delay = {delay} }}")).collect();
-        let text = format!(
-            "fast_period = 1.0\nratio = {ratio}\nsignal = {{ band = {band} }}\n\
-             target = {{ filter = {{ {filter} }} }}\nchannel = [{}]\ndesign = {{ method = \"h2\", taps = 48 }}\n",
-            channels.join(", ")
-        );
-        let spec = Spec::from_toml(&text, "spec.toml").unwrap();
-        let error = |latency: usize| {
-            let problem = Problem::new(&with_usual_noise(&spec), latency).unwrap();
-            let plant = LiftedPlant::new(&problem);
-            let instants = -(latency as i64)..=ratio as i64 - 1 - latency as i64;
-            let best = best_taps(&problem, 48 / ratio, instants).unwrap();
-            let tap = |i: usize, n: usize| best[n % ratio][i][n / ratio];
-            let taps = (0..delays.len()).map(|i| (0..48).map(|n| tap(i, n)).collect()).collect();
-            whole_error(&plant, &SynthesisFilters::Fir(taps)).unwrap()
-        };
-        let errors: Vec<f64> = (0..32).map(error).collect();
-        assert_eq!((shortest(&errors), latency(&spec)), (expected, Ok(expected)), "{band}: {errors:?}");
-        // A gamma method takes the same one.
-        let fir = Spec { design: DesignSpec::new(Method::Fir, Some(48)), ..spec };
-        assert_eq!(latency(&fir), Ok(expected));
-    }
+    Spec::from_toml(&text, "spec.toml").unwrap()
+}
+
+/// The figures of the bank itself: its largest image, its SNR, and the noise in it.
+fn figures_of(spec: &Spec, taps: usize) -> crate::figures::Figures {
+    let mut sized = spec.clone();
+    sized.design = sized.design.with_taps(Some(taps));
+    let bank = crate::design::design(&sized, &crate::design::Options::without_proof()).unwrap().bank;
+    crate::figures::Figures::new(&bank).unwrap()
+}
+
+#[test]
+fn the_fewest_taps_have_the_images_that_are_asked_for() {
+    let spec = in_band("target_sfdr_db = 75");
+    let taps = Sizing::of(&spec).unwrap().taps;
+    let image = |taps: usize| figures_of(&spec, taps).image.unwrap().db.0;
+    assert!(image(taps) <= -75.0 && image(taps - 1) > -75.0, "{taps}: {} {}", image(taps), image(taps - 1));
+}
+
+#[test]
+fn open_taps_bring_images_below_the_noise() {
+    let spec = Spec { design: DesignSpec::new(Method::Fir, None), ..in_band("taps = 1, noise = 1e-4") };
+    let taps = Sizing::of(&spec).unwrap().taps;
+    let below = |taps: usize| {
+        let quiet = in_band(&format!("taps = {taps}"));
+        let mut bank = crate::design::design(&quiet, &crate::design::Options::without_proof()).unwrap().bank;
+        bank.spec = Some(Spec { channels: spec.channels.clone(), ..quiet });
+        let figures = crate::figures::Figures::new(&bank).unwrap();
+        -figures.image.unwrap().db.0 - figures.snr.noise_db.unwrap().0
+    };
+    assert!(below(taps) >= 20.0 && below(taps - 1) < 20.0, "{taps}: {} {}", below(taps), below(taps - 1));
 }
 
 /// A wide low-pass beside a resonance with 1 / damping radians: under noise the error falls by little at
@@ -276,9 +267,31 @@ fn a_slow_gain_at_long_latencies_counts() {
         let den = [1.0, 2.0 * damping + pole, square + 2.0 * damping * pole, pole * square];
         let mut problem = problem(&format!("{{ num = {num:?}, den = {den:?} }}"), 1, &[0.3]);
         problem.noise = vec![noise * noise];
-        let chosen = LeastErrors::causal(&problem).unwrap().shortest();
-        let all = LeastErrors::new(&problem, 3600, 0..=512).unwrap();
-        let excess = 20.0 * (all.rms(chosen) / all.least()).log10();
-        assert!(excess < 0.1025, "latency {chosen}: {excess} dB, {} is enough", all.shortest());
+        let causal = CausalErrors::new(&problem).unwrap();
+        let (chosen, excess) =
+            (causal.shortest(), 20.0 * (causal.rms(causal.shortest()) / causal.least()).log10());
+        assert!(excess < 0.1025 && causal.longest() > 3 * chosen, "latency {chosen}: {excess} dB");
+        // FIR banks of many more frames than the latency are as good.
+        let latencies = [0, 1, 3, 20, 50];
+        let fir = FirErrors::new(&problem, &[], 400, 0..=50);
+        for latency in latencies {
+            let [one, other] = [causal.rms(latency), fir.square(BankSize { taps: 400, latency }).sqrt()];
+            assert!((one / other - 1.0).abs() < 0.02, "latency {latency}: {one} {other}");
+        }
+    }
+}
+
+/// The errors of causal banks are those of long FIR banks at every latency, for several channels and phases.
+#[test]
+fn causal_errors_are_those_of_long_histories() {
+    for noise in [1e-3, 0.1] {
+        let mut problem = problem(STEEP, 3, &[4.4, 0.3]);
+        problem.noise = vec![noise * noise, 4.0 * noise * noise];
+        let causal = CausalErrors::new(&problem).unwrap();
+        let fir = FirErrors::new(&problem, &[], 180, 0..=40);
+        for latency in 0..=causal.longest().min(40) {
+            let [one, other] = [causal.rms(latency), fir.square(BankSize { taps: 180, latency }).sqrt()];
+            assert!((one / other - 1.0).abs() < 1e-3, "noise {noise}, latency {latency}: {one} {other}");
+        }
     }
 }

@@ -91,7 +91,7 @@ fn uncertain_values_count_as_converters_that_are_off() {
         println!("{errors:?}: SNR {:.2} dB simulated, {:.2} dB predicted", found.0, told.0);
         assert!((found - told).0.abs() < 0.5, "{errors:?}: {found:?} {told:?}");
         let spread = Deviations::of_spec(case.bank.spec.as_ref().unwrap());
-        let tones = ToneResponse::new(&case.bank, case.plain, spread).unwrap();
+        let tones = ToneResponse::new(&case.bank.filters, case.plain, spread).unwrap();
         let there = tones.at(bin as f64 / (2 * FRAMES) as f64);
         for (power, told) in [(image, there.image), (gains, there.gain_error)] {
             let found = power.sqrt();

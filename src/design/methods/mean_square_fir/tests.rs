@@ -8,6 +8,7 @@ use crate::bank::SynthesisFilters;
 use crate::design::filters::lifted;
 use crate::design::problem::Problem;
 use crate::design::{Design, LiftedPlant, Options, analyze_mean, design};
+use crate::figures::Figures;
 use crate::linalg::Complex;
 use crate::lti::gramian::h2_norm;
 use crate::spec::{
@@ -213,6 +214,34 @@ fn undersampling_of_an_intermediate_frequency() {
         let converter = |delay| Converter { delay, noise, filter: filter.clone() };
         let converters = vec![converter(1.03), converter(0.0)];
         check(&Case { ratio: 2, latency: 24, taps: Some(64), target: filter.clone(), converters }, golden);
+    }
+}
+
+/// Banks for a band, against `numpy.linalg.lstsq` on the rows `sqrt(w) Phi_i e^{2 pi j f t}` of 300
+/// Gauss-Legendre nodes over the band, in double precision: SNR for a flat spectrum there, and the largest
+/// image.
+#[test]
+fn banks_for_a_band_are_those_of_least_squares() {
+    let two_for_two = "ratio = 2\nchannel = [{ delay = 1.0062 }, { delay = 0.25 }]\n";
+    let four =
+        "ratio = 4\nchannel = [{ delay = 3.0062 }, { delay = 1.9955 }, { delay = 1.0038 }, { delay = 0 }]\n";
+    let apart = "ratio = 2\nchannel = [{ delay = 1.2 }, { delay = 0.6 }]\n";
+    for (converters, order, cutoff, band, sizes, snr, image) in [
+        (two_for_two, 4, 0.45, 0.45, "latency = 32\ndesign.taps = 64", 114.386, 92.384),
+        (four, 4, 0.45, 0.45, "latency = 25\ndesign.taps = 48", 123.110, 101.257),
+        (apart, 2, 0.4167, 0.41666666, "latency = 24\ndesign.taps = 48", 129.179, 110.834),
+    ] {
+        let text = format!(
+            "fast_rate = 1.0\n{converters}{sizes}\ndesign.method = \"h2\"\nsignal.band = {band}\n\
+             target.filter = {{ family = \"butterworth\", order = {order}, cutoff = {cutoff} }}\n"
+        );
+        let spec = Spec::from_toml(&text, "spec.toml").unwrap();
+        let figures = Figures::new(&design(&spec, &Options::without_proof()).unwrap().bank).unwrap();
+        let [found, spur] = [figures.snr.total_db.0, -figures.image.unwrap().db.0];
+        assert!(
+            (found - snr).abs() < 0.1 && (spur - image).abs() < 0.1,
+            "{found} {spur} instead of {snr} {image}"
+        );
     }
 }
 

@@ -1,8 +1,9 @@
-//! The analog signal for which figures hold: white noise in a band, or through the front ends at all
+//! The analog signal for which mean squares hold: white noise in a band, or through the front ends at all
 //! frequencies.
 
-use crate::design::Problem;
-use crate::linalg::{CMat, Complex};
+use super::deviations::Deviations;
+use super::problem::Problem;
+use crate::linalg::{self, CMat, Complex};
 use crate::units::RadiansPerFastPeriod;
 use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
@@ -23,7 +24,7 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// A signal that reaches the samples of a problem.
 #[derive(Debug, Clone)]
-pub(super) struct Signal {
+pub(crate) struct Signal {
     problem: Problem,
     /// The frequencies that it occupies with unit density, radians per fast period. `None`: all.
     band: Option<RangeInclusive<f64>>,
@@ -48,34 +49,34 @@ struct Alias {
 ///
 /// The mean over theta of `|reference - F measurement|^2 / M` (Frobenius) is the mean square of the error of
 /// the filters F per fast sample.
-pub(super) struct Columns {
+#[derive(Debug, Clone)]
+pub(crate) struct Columns {
     /// w of each column, radians per fast period.
-    pub(super) frequencies: Vec<f64>,
+    pub(crate) frequencies: Vec<f64>,
     /// N rows.
-    pub(super) measurement: CMat,
+    pub(crate) measurement: CMat,
     /// M rows.
-    pub(super) reference: CMat,
+    pub(crate) reference: CMat,
 }
 
 impl Signal {
-    /// White noise of unit density in a band, before the front ends of `problem`.
-    pub(super) fn in_band(problem: Problem, band: RangeInclusive<f64>) -> Self {
-        Self { problem, band: Some(band), aliases: Vec::new() }
-    }
-
-    /// White noise of unit density at all frequencies, before the front ends of `problem`.
-    pub(super) fn everywhere(problem: Problem) -> Self {
-        let aliases = aliases(&problem);
-        Self { problem, band: None, aliases }
+    /// That of `problem`: white noise of unit density in its band, or through the filter of its signal at
+    /// all frequencies.
+    pub(crate) fn of(problem: &Problem) -> Self {
+        let Some([low, high]) = problem.band else {
+            return Self { problem: problem.clone(), band: None, aliases: aliases(problem) };
+        };
+        let problem = Problem { signal: None, ..problem.clone() };
+        Self { problem, band: Some(low.0..=high.0), aliases: Vec::new() }
     }
 
     /// The front ends, delays and rates.
-    pub(super) fn problem(&self) -> &Problem {
+    pub(crate) fn problem(&self) -> &Problem {
         &self.problem
     }
 
     /// Number of columns at an angle, about.
-    pub(super) fn columns(&self) -> usize {
+    pub(crate) fn columns(&self) -> usize {
         let in_band = |band: &RangeInclusive<f64>| {
             2 + (self.problem.ratio as f64 * (band.end() - band.start()) / PI) as usize
         };
@@ -84,7 +85,7 @@ impl Signal {
 
     /// Angles at which the columns change abruptly or much: the folded ends of the band, or the folded
     /// resonances of the front ends.
-    pub(super) fn breaks(&self) -> Vec<f64> {
+    pub(crate) fn breaks(&self) -> Vec<f64> {
         let folded = |w: f64| {
             let turn = (self.problem.ratio as f64 * w).rem_euclid(TAU);
             turn.min(TAU - turn)
@@ -100,7 +101,7 @@ impl Signal {
     }
 
     /// The columns at theta, radians per slow period.
-    pub(super) fn at(&self, theta: f64) -> Columns {
+    pub(crate) fn at(&self, theta: f64) -> Columns {
         let Problem { ratio, latency, front_ends, target, channels, .. } = &self.problem;
         let filters = 0..front_ends.len();
         let period = *ratio as f64;
@@ -126,6 +127,29 @@ impl Signal {
             }
         }
         Columns { frequencies, measurement, reference }
+    }
+}
+
+impl Columns {
+    /// The mean over errors of the converters, and beside it columns that the samples of one converter alone
+    /// have: the mean square over all columns is that over the errors. A delay shared by the samples of a
+    /// converter changes nothing between them.
+    pub(crate) fn with_errors(mut self, problem: &Problem, deviations: &[Deviations]) -> Self {
+        let mut rest = Vec::new();
+        for (own, samples) in deviations.iter().zip(problem.converters()) {
+            let mut beside = CMat::zeros(self.measurement.nrows(), self.measurement.ncols());
+            for (k, &w) in self.frequencies.iter().enumerate() {
+                for i in samples.clone() {
+                    beside[(i, k)] = self.measurement[(i, k)] * own.power(w).sqrt();
+                    self.measurement[(i, k)] *= own.mean_phase(w);
+                }
+            }
+            rest.push(beside);
+        }
+        let parts: Vec<&CMat> = std::iter::once(&self.measurement).chain(&rest).collect();
+        self.measurement = linalg::hstack(&parts);
+        self.reference = self.reference.resize_horizontally(self.measurement.ncols(), Complex::ZERO);
+        self
     }
 }
 

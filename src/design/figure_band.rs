@@ -1,9 +1,8 @@
-//! The band in which figures hold, and what the words about them need to know of a bank.
+//! The band in which figures hold.
 
+use super::problem::Problem;
 use crate::analog::{StableFilter, resolved_band, signal};
-use crate::bank::{Bank, SynthesisFilters};
-use crate::design::Problem;
-use crate::spec::{Band, Method, Spec};
+use crate::spec::{Band, Spec};
 use crate::units::{CyclesPerFastPeriod, Hertz};
 use std::f64::consts::TAU;
 
@@ -33,7 +32,7 @@ impl FigureBand {
     /// The band of the spec's `[signal]`: the stated one, or the half-power band of its filter. Without a
     /// signal the half-power band of the target, up to half the rate at which the channels sample together,
     /// f_N = min(1, N / M) / (2 h). A target that lies above f_N keeps its band: it is undersampled.
-    pub(super) fn new(spec: &Spec, problem: &Problem) -> Self {
+    pub(crate) fn new(spec: &Spec, problem: &Problem) -> Self {
         if let Some(Band { low, high }) = spec.signal.as_ref().and_then(|signal| signal.band()) {
             return Self { low_hertz: low, high_hertz: high, source: BandSource::Signal };
         }
@@ -50,36 +49,7 @@ impl FigureBand {
     }
 
     /// The ends in cycles per fast period.
-    pub(super) fn cycles(&self, spec: &Spec) -> [CyclesPerFastPeriod; 2] {
+    pub(crate) fn cycles(&self, spec: &Spec) -> [CyclesPerFastPeriod; 2] {
         [self.low_hertz, self.high_hertz].map(|end| end.per_fast_period(spec.fast_period))
-    }
-}
-
-/// How a bank was designed, and for what.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Setup {
-    /// Of the design.
-    pub method: Method,
-    /// Whether the filters are recursive, so that taps do not limit them.
-    pub is_recursive: bool,
-    /// The ratio M of the rates.
-    pub ratio: usize,
-    /// The number of channels.
-    pub channels: usize,
-    /// Whether the spec has uncertain cut-offs, which the signal-to-noise ratio does not count.
-    pub has_uncertain_cutoffs: bool,
-}
-
-impl Setup {
-    pub(super) fn new(bank: &Bank, spec: &Spec) -> Self {
-        let channels = spec.channels.len();
-        let cutoffs = spec.uncertainty.as_ref().map(|table| table.cutoffs(channels));
-        Self {
-            method: bank.method,
-            is_recursive: matches!(bank.filters, SynthesisFilters::StateSpace(_)),
-            ratio: bank.ratio,
-            channels,
-            has_uncertain_cutoffs: cutoffs.is_some_and(|shares| shares.into_iter().any(|share| share > 0.0)),
-        }
     }
 }

@@ -1,8 +1,10 @@
 //! What a bank makes of a tone: its images and its error of gain and phase.
 
-use crate::bank::Bank;
-use crate::design::filters::FilterResponse;
-use crate::design::{DesignError, Deviations, Problem};
+use super::DesignError;
+use super::deviations::Deviations;
+use super::filters::FilterResponse;
+use super::problem::Problem;
+use crate::bank::SynthesisFilters;
 use crate::linalg::{CMat, Complex, fourier};
 use crate::units::{CyclesPerFastPeriod, RadiansPerFastPeriod};
 use std::f64::consts::TAU;
@@ -45,7 +47,7 @@ pub struct Tone {
 }
 
 /// A bank that answers tones.
-pub(super) struct ToneResponse {
+pub(crate) struct ToneResponse {
     problem: Problem,
     filters: FilterResponse,
     /// Of the converters.
@@ -53,17 +55,21 @@ pub(super) struct ToneResponse {
 }
 
 impl ToneResponse {
-    /// Of the filters of `bank` after the front ends of `problem`, without the spectrum of a signal, for
-    /// converters that are off by so much.
+    /// Of `filters` after the front ends of `problem`, without the spectrum of a signal, for converters that
+    /// are off by so much.
     ///
     /// # Errors
     /// [`DesignError::Lti`] for unstable filters.
-    pub(super) fn new(bank: &Bank, problem: Problem, spread: Vec<Deviations>) -> Result<Self, DesignError> {
-        Ok(Self { problem, filters: FilterResponse::new(&bank.filters, bank.ratio)?, spread })
+    pub(crate) fn new(
+        filters: &SynthesisFilters,
+        problem: Problem,
+        spread: Vec<Deviations>,
+    ) -> Result<Self, DesignError> {
+        Ok(Self { filters: FilterResponse::new(filters, problem.ratio)?, problem, spread })
     }
 
     /// The output at w / (2 pi) = `frequency`.
-    pub(super) fn at(&self, frequency: f64) -> Tone {
+    pub(crate) fn at(&self, frequency: f64) -> Tone {
         let Problem { ratio, latency, front_ends, target, channels, .. } = &self.problem;
         let w = TAU * frequency;
         let passed: Vec<Complex<f64>> =
@@ -96,14 +102,14 @@ impl ToneResponse {
     }
 
     /// Tones at `count` equidistant frequencies of a band, ends included.
-    pub(super) fn curve(&self, [low, high]: [CyclesPerFastPeriod; 2], count: usize) -> Vec<Tone> {
+    pub(crate) fn curve(&self, [low, high]: [CyclesPerFastPeriod; 2], count: usize) -> Vec<Tone> {
         let step = (high.0 - low.0) / count.saturating_sub(1).max(1) as f64;
         (0..count).map(|k| self.at(low.0 + step * k as f64)).collect()
     }
 
     /// The tones of the largest image and of the largest error of gain in a band, searched between the
     /// points of a grid too. Frequencies at which the target is zero are left out.
-    pub(super) fn worst(&self, band: [CyclesPerFastPeriod; 2]) -> Worst {
+    pub(crate) fn worst(&self, band: [CyclesPerFastPeriod; 2]) -> Worst {
         let grid = self.grid(band);
         let largest = grid.iter().map(|tone| tone.target).fold(0.0, f64::max);
         let counts = |tone: &Tone| tone.target > VANISHING * largest;
@@ -170,25 +176,6 @@ impl ToneResponse {
     }
 }
 
-/// What errors of a converter make of a tone.
-impl Deviations {
-    /// A delay that is off by a Gaussian error of deviation s turns a sample of the frequency w by a random
-    /// phase, whose mean is chi = e^{-(w s)^2 / 2}.
-    pub(super) fn mean_phase(&self, w: f64) -> f64 {
-        (-0.5 * (w * self.delay.0).powi(2)).exp()
-    }
-
-    /// 1 - chi^2, the power of what the random phase has beside its mean.
-    pub(super) fn phase_power(&self, w: f64) -> f64 {
-        -(-(w * self.delay.0).powi(2)).exp_m1()
-    }
-
-    /// The power of what a sample has beside its mean, relative to the sample without errors.
-    pub(super) fn power(&self, w: f64) -> f64 {
-        self.phase_power(w) + self.gain * self.gain
-    }
-}
-
 /// M Y_k of some channels, k = 0 .. M - 1, at the frequency w.
 fn answer(
     filters: &CMat,
@@ -205,11 +192,11 @@ fn answer(
 
 /// The worst tones of a band.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Worst {
+pub(crate) struct Worst {
     /// Largest image; `None` where the bank passes some tone not at all.
-    pub(super) image: Option<Tone>,
+    pub(crate) image: Option<Tone>,
     /// Largest error of gain.
-    pub(super) gain_error: Option<Tone>,
+    pub(crate) gain_error: Option<Tone>,
     /// Whether the target is zero somewhere in the band.
-    pub(super) vanishes: bool,
+    pub(crate) vanishes: bool,
 }
