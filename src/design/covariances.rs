@@ -10,7 +10,7 @@ use super::DesignError;
 use super::lifting::JointState;
 use super::problem::Problem;
 use crate::linalg::{self, Complex, Mat};
-use crate::lti::exponential::NODES;
+use crate::linalg::GAUSS_LEGENDRE;
 use crate::lti::gramian::controllability_root;
 use crate::units::FastPeriods;
 use std::f64::consts::TAU;
@@ -133,19 +133,19 @@ impl Averaged<'_> {
         for width in self.covariances.panels(self.deviation, 2.0 * GAUSSIAN_REACH * self.deviation) {
             let transitions = match known.take() {
                 Some((same, transitions)) if same == width => transitions,
-                _ => NODES
+                _ => GAUSS_LEGENDRE
                     .iter()
                     .map(|node| node.0)
                     .chain([1.0])
                     .map(|part| joint.transition(part * width))
                     .collect(),
             };
-            for ((part, share), transition) in NODES.into_iter().zip(&transitions) {
+            for ((part, share), transition) in GAUSS_LEGENDRE.into_iter().zip(&transitions) {
                 let (at, weight, moved) = (time + part * width, share * width, transition * &state);
                 self.far += &moved * (weight * self.density(at - GAUSSIAN_REACH * self.deviation));
                 self.nodes.push(Node { time: at, weight, value: joint.c() * moved });
             }
-            state = &transitions[NODES.len()] * state;
+            state = &transitions[GAUSS_LEGENDRE.len()] * state;
             time += width;
             known = Some((width, transitions));
         }

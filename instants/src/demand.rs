@@ -1,0 +1,55 @@
+//! Instants without any pattern: the outputs of a block from all samples around it.
+
+use super::estimator::{Estimator, MeanSquare, Sample};
+use super::knots::mean;
+use super::recording::Recording;
+use hybank_core::units::FastPeriods;
+use hybank_linalg::{LinalgError, Mat};
+
+/// Every how manieth output the error is computed: it takes longer than the output itself.
+const ERROR_EVERY: usize = 16;
+
+/// Outputs, and the mean of their errors.
+pub(super) struct Block {
+    pub(super) outputs: Vec<f64>,
+    pub(super) error: MeanSquare,
+}
+
+/// The target at ascending `instants`, from the samples between them and `reach` more of each recording on
+/// either side.
+///
+/// With `a = C^-1 x` the outputs are `r' a`, so C is solved once for the block.
+///
+/// # Errors
+/// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
+pub(super) fn block(
+    estimator: &Estimator,
+    recordings: &[Recording],
+    reach: usize,
+    instants: &[FastPeriods],
+) -> Result<Block, LinalgError> {
+    let (Some(&origin), Some(&end)) = (instants.first(), instants.last()) else {
+        return Ok(Block { outputs: Vec::new(), error: MeanSquare { signal: 0.0, noise: 0.0 } });
+    };
+    let (mut samples, mut values) = (Vec::new(), Vec::new());
+    for recording in recordings {
+        for number in recording.around(origin..end, reach) {
+            let sample = recording.sample(number as i64);
+            samples.push(Sample { instant: sample.instant - origin, ..sample });
+            values.push(recording.samples()[number]);
+        }
+    }
+    if samples.is_empty() {
+        let error = MeanSquare { signal: 1.0, noise: 0.0 };
+        return Ok(Block { outputs: vec![0.0; instants.len()], error });
+    }
+    let instants: Vec<FastPeriods> = instants.iter().map(|instant| *instant - origin).collect();
+    let set = estimator.set(&samples);
+    let factor = set.factor()?;
+    let solved = factor.solve(&Mat::from_column_slice(values.len(), 1, &values));
+    let outputs = set.with_target(&instants).tr_mul(&solved).as_slice().to_vec();
+    let looked_at: Vec<FastPeriods> = instants.iter().step_by(ERROR_EVERY).copied().collect();
+    let with_target = set.with_target(&looked_at);
+    let errors = set.best_errors(&factor.solve(&with_target), &with_target);
+    Ok(Block { outputs, error: mean(&errors) })
+}
