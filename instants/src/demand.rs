@@ -6,8 +6,11 @@ use super::recording::Recording;
 use hybank_core::units::FastPeriods;
 use hybank_linalg::{LinalgError, Mat};
 
-/// Every how manieth output the error is computed: it takes longer than the output itself.
-const ERROR_EVERY: usize = 16;
+/// Outputs of a block of which the error is computed, at least: it takes longer than the output itself.
+const ERRORS: usize = 5;
+
+/// The longest time between two outputs of a block.
+pub(super) const LONGEST_BLOCK: FastPeriods = FastPeriods(64.0);
 
 /// Outputs, and the mean of their errors.
 pub(super) struct Block {
@@ -31,9 +34,10 @@ pub(super) fn block(
     let (Some(&origin), Some(&end)) = (instants.first(), instants.last()) else {
         return Ok(Block { outputs: Vec::new(), error: MeanSquare { signal: 0.0, noise: 0.0 } });
     };
+    let within = (estimator.signals().longest() - LONGEST_BLOCK) * 0.5;
     let (mut samples, mut values) = (Vec::new(), Vec::new());
     for recording in recordings {
-        for number in recording.around(origin..end, reach) {
+        for number in recording.around(origin..end, reach, within) {
             let sample = recording.sample(number as i64);
             samples.push(Sample { instant: sample.instant - origin, ..sample });
             values.push(recording.samples()[number]);
@@ -48,7 +52,9 @@ pub(super) fn block(
     let factor = set.factor()?;
     let solved = factor.solve(&Mat::from_column_slice(values.len(), 1, &values));
     let outputs = set.with_target(&instants).tr_mul(&solved).as_slice().to_vec();
-    let looked_at: Vec<FastPeriods> = instants.iter().step_by(ERROR_EVERY).copied().collect();
+    // An odd number: even ones would meet the same phase of a frame again and again.
+    let every = (instants.len() / ERRORS).max(1) | 1;
+    let looked_at: Vec<FastPeriods> = instants.iter().step_by(every).copied().collect();
     let with_target = set.with_target(&looked_at);
     let errors = set.best_errors(&factor.solve(&with_target), &with_target);
     Ok(Block { outputs, error: mean(&errors) })

@@ -98,6 +98,15 @@ pub struct SampleSet<'a> {
 }
 
 impl SampleSet<'_> {
+    /// The same where the signal has another power than its mean, 1: all is relative to that power.
+    #[must_use]
+    pub fn at_level(mut self, power: f64) -> Self {
+        for (k, sample) in self.samples.iter().enumerate() {
+            self.among[(k, k)] += self.signals.noise_of(sample.converter) * (1.0 / power - 1.0);
+        }
+        self
+    }
+
     /// r, one column for each instant.
     pub fn with_target(&self, instants: &[FastPeriods]) -> Mat {
         Mat::from_fn(self.samples.len(), instants.len(), |k, column| {

@@ -1,6 +1,6 @@
 //! The signal behind whole recordings, at instants of a regular grid.
 
-use super::demand;
+use super::demand::{self, LONGEST_BLOCK};
 use super::estimator::{Estimator, MeanSquare};
 use super::knots::{Stretch, mean};
 use super::recording::Recording;
@@ -18,6 +18,9 @@ const MOST_DRIFT: f64 = 1.0 / 16.0;
 /// Relative difference up to which clocks have nearly one rate.
 const SAME_RATE: f64 = 0.005;
 
+/// Times that samples around an output may lie farther apart than in the mean: stamps come unevenly.
+const SLACK: f64 = 1.5;
+
 /// What is wanted of recordings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FusionSettings {
@@ -27,6 +30,14 @@ pub struct FusionSettings {
     pub count: usize,
     /// Samples of each recording on either side of an output.
     pub reach: usize,
+}
+
+impl FusionSettings {
+    /// The longest time that the covariances for [`fuse`] should know.
+    pub fn longest(&self, recordings: &[Recording]) -> FastPeriods {
+        let period = recordings.iter().map(Recording::mean_period).fold(0.0, f64::max);
+        FastPeriods(SLACK * 2.0 * (self.reach + 1) as f64 * period) + LONGEST_BLOCK
+    }
 }
 
 /// The signal behind recordings.
@@ -73,7 +84,7 @@ type Part = (Vec<f64>, Vec<MeanSquare>);
 /// Recorders of nearly one rate, that of an integer number of fast periods, share taps over many frames. For
 /// all others, and around lost samples, the samples of each block are taken for themselves. An output depends
 /// on the instants of the samples around it and on nothing else, so it has the same bits for any number of
-/// threads.
+/// threads. Samples farther away than half of the [longest](super::Signals::longest) time are left out.
 ///
 /// # Errors
 /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
@@ -83,7 +94,8 @@ pub fn fuse(
     settings: FusionSettings,
 ) -> Result<Fused, LinalgError> {
     let FusionSettings { first, count, reach } = settings;
-    let common = common_ratio(recordings);
+    let longest = estimator.signals().longest();
+    let common = common_ratio(recordings).filter(|ratio| ((2 * reach + 2) * ratio) as f64 <= longest.0);
     let grid = Grid { first, ratio: common.unwrap_or(1) };
     let frames = count.div_ceil(grid.ratio);
     let length = FRAMES_PER_BLOCK * common.map_or(1, |ratio| blocks_of_stretch(recordings, ratio));

@@ -3,7 +3,8 @@
 //! From frame to frame the samples move along with the outputs, only their offsets drift. So a set of taps
 //! serves for many frames, and between two knots the taps are on lines. Knots lie at absolute frames, dense
 //! where taps change fast: an interval is halved as long as a line through its ends is worse in its middle
-//! than the best taps there.
+//! than the best taps there, or two recorders sample at one instant within it. There taps change sign within
+//! a ten thousandth of a period, which no look at the middle would find.
 
 use super::estimator::{Estimator, MeanSquare, Sample, Taps};
 use super::fusion::Grid;
@@ -14,6 +15,9 @@ use std::ops::Range;
 
 /// What the error may be over that of the best taps: 0.1 dB.
 const MOST_LOSS: f64 = 1.023_292_992_280_754;
+
+/// Periods below which recorders do not drift apart, but differ by the rounding of their instants.
+const STANDSTILL: f64 = 1e-9;
 
 /// Taps for the frames of one stretch.
 pub(super) struct Stretch<'a> {
@@ -94,6 +98,11 @@ impl<'a> Stretch<'a> {
             return Ok(());
         }
         let frame = left.frame.midpoint(right.frame);
+        if self.has_coincidence(left.frame, right.frame) {
+            let middle = self.knot(frame)?;
+            self.refine(left, middle.clone())?;
+            return self.refine(middle, right);
+        }
         let samples = self.samples(frame);
         let set = self.estimator.set(&samples);
         let with_target = set.with_target(&self.grid.phases());
@@ -106,6 +115,21 @@ impl<'a> Stretch<'a> {
         }
         self.refine(left, middle.clone())?;
         self.refine(middle, right)
+    }
+
+    /// Whether two recorders sample at one instant between two frames.
+    fn has_coincidence(&self, first: usize, last: usize) -> bool {
+        let place = |i: usize, j: usize, frame: usize| {
+            let number = self.starts[i] + frame as i64;
+            let instant = self.recordings[i].clock().at(number as f64);
+            self.recordings[j].clock().sample_at(instant) - frame as f64
+        };
+        let meet = |i: usize, j: usize| {
+            let [before, after] = [first, last].map(|frame| place(i, j, frame));
+            before.floor() != after.floor() && (after - before).abs() > STANDSTILL
+        };
+        let count = self.recordings.len();
+        (0..count).any(|i| (0..i).any(|j| meet(i, j)))
     }
 
     /// The outputs of all frames, in their order; `None` where a sample is not there.

@@ -65,16 +65,31 @@ impl Recording {
     }
 
     /// The numbers of the samples that are there: those between two instants, and `count` more at either
-    /// side, as far as there are so many.
-    pub(super) fn around(&self, instants: Range<FastPeriods>, count: usize) -> Vec<usize> {
+    /// side, as far as there are so many and not more than `within` away.
+    pub(super) fn around(
+        &self,
+        instants: Range<FastPeriods>,
+        count: usize,
+        within: FastPeriods,
+    ) -> Vec<usize> {
         let last = self.samples.len() as i64;
         let first = self.nearest(instants.start).clamp(0, last) as usize;
         let end = (self.nearest(instants.end) + 1).clamp(first as i64, last) as usize;
+        let (earliest, latest) = (instants.start - within, instants.end + within);
+        let is_near = |k: &usize| (earliest..=latest).contains(&self.clock.at(*k as f64));
         let is_there = |k: &usize| self.samples[*k].is_finite();
-        let mut before: Vec<usize> = (0..first).rev().filter(is_there).take(count).collect();
-        before.reverse();
-        let after = (end..self.samples.len()).filter(is_there).take(count);
-        before.into_iter().chain((first..end).filter(is_there)).chain(after).collect()
+        let before = (0..first).rev().take_while(is_near).filter(is_there).take(count);
+        let mut numbers: Vec<usize> = before.collect();
+        numbers.reverse();
+        numbers.extend((first..end).filter(is_near).filter(is_there));
+        numbers.extend((end..self.samples.len()).take_while(is_near).filter(is_there).take(count));
+        numbers
+    }
+
+    /// Fast periods from one sample to the next, in the mean.
+    pub(super) fn mean_period(&self) -> f64 {
+        let span = self.span();
+        (span.end - span.start).0 / self.samples.len().saturating_sub(1).max(1) as f64
     }
 }
 
@@ -88,9 +103,13 @@ mod tests {
         samples[8..11].fill(f64::NAN);
         let recording = Recording::new(samples, Clock::even(FastPeriods(0.5), FastPeriods(2.0)), 0);
         let between = FastPeriods(14.5)..FastPeriods(18.5);
-        assert_eq!(recording.around(between, 2), [5, 6, 7, 11, 12]);
-        assert_eq!(recording.around(FastPeriods(-9.0)..FastPeriods(1.0), 2), [0, 1, 2]);
-        assert_eq!(recording.around(FastPeriods(99.0)..FastPeriods(99.0), 2), [18, 19]);
+        assert_eq!(recording.around(between, 2, FastPeriods(99.0)), [5, 6, 7, 11, 12]);
+        let at = |first, last, within| {
+            recording.around(FastPeriods(first)..FastPeriods(last), 2, FastPeriods(within))
+        };
+        assert_eq!(at(-9.0, 1.0, 99.0), [0, 1, 2]);
+        assert_eq!(at(99.0, 99.0, 99.0), [18, 19]);
+        assert_eq!((at(99.0, 99.0, 59.0), at(99.0, 99.0, 61.0)), (vec![], vec![19]));
         assert!(recording.is_whole(&(0..8)) && recording.is_whole(&(11..20)));
         assert!(
             !recording.is_whole(&(7..9)) && !recording.is_whole(&(-1..3)) && !recording.is_whole(&(15..21))
