@@ -81,6 +81,30 @@ fn what_a_format_cannot_hold_is_refused() {
     assert!(matches!(export(&large, Format::C99, "b", Some(32)), Err(ExportError::Accumulator { .. })));
 }
 
+#[test]
+fn circuits_that_cannot_be_are_refused() {
+    let bank = integers(4, vec![vec![3, -2], vec![-5, 7]]);
+    let circuit = |bank: &Bank, name: &str, input_bits, accumulator_bits| {
+        let options = VerilogOptions { input_bits, accumulator_bits, ..VerilogOptions::default() };
+        Verilog::new(bank, name, &options)
+    };
+    assert!(matches!(circuit(&fir(), "b", Some(8), None), Err(ExportError::NoIntegers { .. })));
+    assert!(matches!(circuit(&bank, "b", None, None), Err(ExportError::NoInputBits)));
+    for name in ["wire", "1a", "a b"] {
+        assert!(matches!(circuit(&bank, name, Some(8), None), Err(ExportError::Name { .. })), "{name}");
+    }
+    for name in ["x1", "clk", "sum1"] {
+        assert!(
+            matches!(circuit(&bank, name, Some(8), None), Err(ExportError::NameOfSignal { .. })),
+            "{name}"
+        );
+    }
+    let narrow = circuit(&bank, "b", Some(8), Some(2));
+    assert!(matches!(narrow, Err(ExportError::NothingLeft { accumulator: 2, fraction_bits: 2, .. })));
+    let many = circuit(&bank, "b", Some(8), None).unwrap().testbench(MOST_RANDOM_FRAMES + 1);
+    assert!(matches!(many, Err(ExportError::Frames { .. })));
+}
+
 /// 2 * 0.5 + 31 * 0.5 .. at full scale 2^4, and 0.5 of full scale is 8 steps.
 #[test]
 fn offsets_are_constants_of_the_sums_or_comments() {

@@ -86,3 +86,14 @@ fn the_norm_lies_in_the_proven_interval() {
         assert!(norm - proven.attained <= 1e-9 * norm, "{ratio}: {norm:e} {proven:?}");
     }
 }
+
+/// The bounds of ordinary plants are stated.
+#[test]
+fn delays_a_millionth_apart_are_resolved() {
+    for apart in [1e-3, 1e-6] {
+        let spec = with_taps(alike(&low_pass(Family::Butterworth, 2, 0.5), 2, 4, &[0.6, 0.6 + apart]), 8);
+        let found = design(&spec, &Options::without_proof()).unwrap().bank.gamma;
+        let (lower, norm) = (found.lower.unwrap(), found.norm.unwrap());
+        assert!(lower <= norm && lower > 0.99 * norm, "{apart:e}: {found:?}");
+    }
+}

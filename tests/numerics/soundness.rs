@@ -189,39 +189,3 @@ fn files_whose_gammas_are_false_are_refused() {
         }
     }
 }
-
-/// Random factors on any of the numbers: what passes is true. `HYBANK_TRIALS=1000` tries that many.
-#[test]
-fn statements_that_pass_are_true() {
-    let mut random = Random(7);
-    let (mut passed, mut refused) = (0, 0);
-    for bank in examples() {
-        let truth = verify(&bank).unwrap();
-        for _ in trials::trials(50) {
-            let mut forged = bank.clone();
-            let size = 10f64.powf(-14.0 * random.part());
-            let factor = 1.0 + if random.part() < 0.5 { -size } else { size };
-            let target = (random.part() * 3.0) as usize;
-            let gamma = &mut forged.gamma;
-            let number = match target {
-                0 => &mut gamma.norm,
-                1 => &mut gamma.upper,
-                _ => {
-                    forged.proof.as_mut().unwrap().upper.gamma *= factor;
-                    &mut None
-                }
-            };
-            *number = number.map(|x| x * factor);
-            let Ok(found) = verify(&forged) else {
-                refused += 1;
-                continue;
-            };
-            passed += 1;
-            let Gamma { norm, upper, .. } = forged.gamma;
-            assert!((norm.unwrap() / bank.gamma.norm.unwrap() - 1.0).abs() < 1e-7, "{forged:?}");
-            assert!(upper.unwrap() >= found.upper && found.upper >= truth.attained, "{forged:?}");
-        }
-    }
-    println!("{refused} refused, {passed} passed and true");
-    assert!(refused > passed / 2 && passed > 0, "{refused} {passed}");
-}

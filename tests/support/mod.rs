@@ -3,7 +3,6 @@
 #![allow(dead_code)]
 
 pub(crate) mod specs;
-pub(crate) mod sweep;
 pub(crate) mod wav_file;
 
 pub(crate) use trials::random;

@@ -12,18 +12,6 @@ fn delay_errors_out_of_all_proportion_are_refused() {
 }
 
 #[test]
-fn a_latency_beyond_memory_is_refused() {
-    let desk = Desk::with_spec(&THESIS.replace("latency = 10", "latency = 65536"));
-    for method in ["fir", "iir", "h2", "sinc"] {
-        desk.refused(
-            1,
-            &["design", "spec.toml", "-o", "bank.json", "--method", method],
-            &["spec.toml:3:", "latency: ", "at most 4096 states"],
-        );
-    }
-}
-
-#[test]
 fn a_chirp_too_fast_for_its_quadrature_is_refused() {
     let desk = Desk::with_spec(THESIS);
     let args = ["simulate", "spec.toml", "--source", "chirp:1Hz..1e9Hz@2s", "-o", "captures"];

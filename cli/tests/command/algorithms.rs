@@ -126,17 +126,3 @@ fn masks_line_up_with_every_form() {
     assert!(late[..extra].iter().all(|&mark| mark == 0));
     assert_eq!(late[extra..], mask);
 }
-
-#[test]
-fn forms_that_do_not_fit_are_refused() {
-    let desk = desk();
-    let iir = concat!(env!("CARGO_MANIFEST_DIR"), "/../filters/thesis-iir.json");
-    let args = |form| ["fuse", iir, "a.wav", "b.wav", "-o", "new.wav", "--algorithm", form];
-    desk.refused(
-        1,
-        &args("overlap-save"),
-        &["thesis-iir.json", "overlap-save needs FIR filters", "recursive"],
-    );
-    desk.refused(2, &args("fast-fir"), &["--algorithm", "direct", "overlap-save"]);
-    desk.refused(2, &args("fourier"), &["--algorithm", "overlap-save"]);
-}

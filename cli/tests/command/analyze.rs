@@ -54,21 +54,6 @@ fn figures_with_errors_are_computed_there() {
 }
 
 #[test]
-fn flags_that_do_not_fit_are_refused() {
-    let desk = desk();
-    let refused =
-        |args: &[&str], words: &[&str]| desk.refused(2, &[&["analyze", "bank.json"], args].concat(), words);
-    refused(&["--delay-box", "1,2,3"], &["--delay-box", "3 values", "2 channels"]);
-    refused(&["--delay-box", "10 parsecs"], &["parsecs", "10ps"]);
-    refused(&["--delay-box=-1ps"], &["half-width"]);
-    refused(&["--gain-box", "60%"], &["50%"]);
-    refused(&["--delay-box", "1ps", "--reference", "3"], &["--reference 3", "2 channels"]);
-    refused(&["--delay-box", "1ps", "--reference", "first"], &["none"]);
-    refused(&["--delay-box", "1ps", "--delay-error", "0,0"], &["--delay-error"]);
-    refused(&["--delay-error", "0,1 parsec"], &["parsec", "10ps"]);
-}
-
-#[test]
 fn errors_of_delays_have_units() {
     let desk = desk();
     let gamma = |errors: &str| {

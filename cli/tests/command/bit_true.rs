@@ -105,45 +105,6 @@ fn offsets_are_subtracted_from_the_sums() {
     }
 }
 
-/// From virtual converters of 12 bits to the spurs that are left: without the constants that of the offsets
-/// stays. An output of 16 bits has the same spurs as the floats.
-#[test]
-fn integers_of_converters_with_offsets_have_no_spurs() {
-    let desk = Desk::empty();
-    let spec = "fast_rate = 1e9\nratio = 4\n[target]\n\
-                filter = { family = \"butterworth\", order = 2, cutoff = 600e6 }\n[signal]\nband = 400e6\n\
-                [design]\nmethod = \"fir\"\ntaps = 48\nbits = 16\n";
-    let offsets = [0.002, -0.001, 0.0015, 0.0];
-    let channel =
-        |(i, offset): (usize, f64)| format!("[[channel]]\ndelay = {}e-9\noffset = {offset}\n", 3 - i);
-    let channels: String = offsets.into_iter().enumerate().map(channel).collect();
-    desk.write("spec.toml", format!("{spec}{channels}"));
-    let zero: String = (0..4).map(|i| channel((i, 0.0))).collect();
-    desk.write("zero.toml", format!("{spec}{zero}"));
-    let simulate = ["simulate", "spec.toml", "--source", "tones:183.1MHz", "--gain", "0.9", "--bits", "12"];
-    desk.good(&[&simulate[..], &["--samples", "65536", "-o", "cap"]].concat());
-    let spurs = |spec: &str, how: &[&str]| {
-        desk.report(&["design", spec, "-o", "b.json"]);
-        let fuse =
-            ["fuse", "b.json", "cap/ch1.wav", "cap/ch2.wav", "cap/ch3.wav", "cap/ch4.wav", "-o", "y.wav"];
-        let report = desk.report(&[&fuse[..], &["--measure", "--tone", "183.1MHz"], how].concat());
-        let worst = |which: &str| -> f64 {
-            let spurs = report["measure"][which]["spurs"].as_array().unwrap();
-            let is_offset = |spur: &&serde_json::Value| spur["causes"][0]["kind"] == "offset";
-            spurs.iter().find(is_offset).map(|spur| number(spur, "/level_dbc")).unwrap()
-        };
-        (worst("before"), worst("after"))
-    };
-    let (before, floats) = spurs("spec.toml", &[]);
-    let (_, integers) = spurs("spec.toml", &["--bit-true"]);
-    let (_, dropped) = spurs("zero.toml", &["--bit-true"]);
-    println!(
-        "offsets: {before:.1} dBc before, {floats:.1} floats, {integers:.1} integers, {dropped:.1} dropped"
-    );
-    assert!(before > -56.0 && dropped > -60.0, "{before} {dropped}");
-    assert!(floats < -95.0 && integers < -95.0, "{floats} {integers}");
-}
-
 /// M output samples for each frame, also where captures are shorter than a latency that is no multiple of M.
 #[test]
 fn short_captures_give_as_many_samples_as_without_the_model() {
@@ -193,20 +154,4 @@ fn a_narrow_accumulator_wraps() {
         .map_or(0, |sum: i64| sum);
     let needed = number(&report, "/needed_accumulator_bits") as u32;
     assert!(largest << 15 <= 1 << (needed - 1) && largest << 15 > 1 << (needed - 2), "{needed}: {largest}");
-}
-
-#[test]
-fn what_has_no_integers_is_refused() {
-    let desk = Desk::with_spec(THESIS);
-    desk.good(&["design", "spec.toml", "-o", "b.json"]);
-    captures(&desk, 16);
-    desk.refused(1, &FUSE, &["b.json", "method = \"fir\" and bits"]);
-    desk.good(&["design", "spec.toml", "-o", "b.json", "--bits", "12", "--force"]);
-    desk.good(&["simulate", "b.json", "--source", "tones:0.3", "--samples", "100", "-o", "cap"]);
-    let floats = ["fuse", "b.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "x.wav", "--bit-true"];
-    desk.refused(1, &floats, &["cap/ch1.wav", "f32le", "16, 24 or 32 bits"]);
-    desk.refused(2, &[&FUSE[..], &["--bits", "16"]].concat(), &["--bit-true", "--bits"]);
-    let words = ["export", "b.json", "--format", "csv", "-o", "x.csv", "--input-bits", "12"];
-    desk.refused(1, &words, &["only the integer code", "leave out --input-bits"]);
-    desk.refused(2, &["fuse", "b.json", "in.wav", "-o", "x.wav", "--accumulator", "40"], &["--bit-true"]);
 }

@@ -82,59 +82,6 @@ pub(crate) fn design(desk: &Desk, spec: &str) {
     desk.write("bank.json", bank.to_json().unwrap());
 }
 
-/// Amplitude at `cycles` per sample of a stretch in which all tones have whole periods.
-fn amplitude(samples: &[f32], cycles: f64) -> f64 {
-    let (mut re, mut im) = (0.0, 0.0);
-    for (n, x) in samples.iter().enumerate() {
-        let angle = TAU * (cycles * n as f64).fract();
-        re += f64::from(*x) * angle.cos();
-        im += f64::from(*x) * angle.sin();
-    }
-    2.0 * re.hypot(im) / samples.len() as f64
-}
-
-/// The largest interleaving spur over the tone, in dBc: at k/4 and k/4 +- f.
-fn worst_spur(samples: &[f32], cycles: f64) -> f64 {
-    let tone = amplitude(samples, cycles);
-    let gain_spurs = (1..4).flat_map(|k| [0.25 * f64::from(k) + cycles, 0.25 * f64::from(k) - cycles]);
-    let spurs = gain_spurs.chain([0.25, 0.5]);
-    let worst = spurs.map(|f| amplitude(samples, f)).fold(0.0, f64::max);
-    20.0 * (worst / tone).log10()
-}
-
-/// Calibrated with tones, a bank leaves interleaving spurs below -75 dBc of a tone at another frequency.
-#[test]
-fn from_captures_to_a_recording_without_spurs() {
-    let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(1));
-    let training = write(&desk, "t", &captured(&[37.1e6, 161.3e6, 211.7e6], 0.31, 16_384, &mut dice));
-    // Whole periods in 16,384 fast samples.
-    let held_out = 3001.0 / 16_384.0;
-    let held = write(&desk, "h", &captured(&[held_out * 1e9], 0.9, 8192, &mut dice));
-    let report = desk.json(&with(
-        &["calibrate", "spec.toml"],
-        &training,
-        &["-o", "measured.toml", "--tone", "37.1MHz,161.3MHz,211.7MHz", "--reference", "4", "--json"],
-    ));
-    for i in 0..3 {
-        let at = |key: &str| number(&report, &format!("/channels/{i}/{key}"));
-        let expected = 3.0 - i as f64 + SKEWS[i];
-        let error = at("delay_samples/value") - expected;
-        assert!(error.abs() < 2.5 * at("delay_samples/half_width") && error.abs() < 2e-4, "{report}");
-        assert!((at("gain/value") - GAINS[i]).abs() < 2.5 * at("gain/half_width"), "{report}");
-        assert!((at("offset/value") - OFFSETS[i] * STEP).abs() < 2.5 * at("offset/half_width"), "{report}");
-    }
-    let spurs = |spec: &str| {
-        design(&desk, spec);
-        let output = desk.run(&with(&["fuse", "bank.json"], &held, &["-o", "y.wav", "--force"]), &[]);
-        assert!(output.status.success(), "{output:?}");
-        worst_spur(&wav::samples(&desk, "y.wav")[8192..24_576], held_out)
-    };
-    let (before, after) = (spurs("spec.toml"), spurs("measured.toml"));
-    assert!(before > -50.0, "without calibration {before:.1} dBc");
-    assert!(after < -75.0, "{after:.1} dBc, without calibration {before:.1} dBc");
-    println!("spurs {before:.1} dBc before, {after:.1} dBc after");
-}
-
 #[test]
 fn the_spec_keeps_what_was_not_measured() {
     let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(2));
@@ -228,50 +175,6 @@ fn write_codes(desk: &Desk, name: &str, channels: &[Vec<f32>]) {
     desk.write(name, turns.fold(String::new(), |text, code| format!("{text}{code}\n")));
 }
 
-/// Captures with tones of their own say more together, and one that contradicts the others is named.
-#[test]
-fn captures_of_the_same_converters_are_pooled() {
-    let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(5));
-    for (name, tone, amplitude) in
-        [("z1.txt", 61.3e6, 0.9), ("z2.txt", 83.9e6, 0.7), ("z3.txt", 161.3e6, 0.8)]
-    {
-        write_codes(&desk, name, &captured(&[tone], amplitude, 2048, &mut dice));
-    }
-    let calibrated = |names: &[&str], tail: &[&str]| {
-        let how = ["--interleaved", "4", "--full-scale", "12bits", "-o", "m.toml", "--json", "--force"];
-        desk.json(&[&["calibrate", "spec.toml"], names, &how, tail].concat())
-    };
-    let all = ["z1.txt", "z2.txt", "z3.txt"];
-    let (one, pooled) = (calibrated(&all[1..2], &[]), calibrated(&all, &[]));
-    assert_eq!((&pooled["frames"], pooled["tones"].as_array().unwrap().len()), (&Value::from(3 * 2048), 3));
-    for (i, (skew, gain)) in SKEWS.iter().zip(GAINS).enumerate().skip(1) {
-        for (what, truth) in [("delay_samples", (3 - i) as f64 + skew - SKEWS[0]), ("gain", gain / GAINS[0])]
-        {
-            let of = |report: &Value, part| number(report, &format!("/channels/{i}/{what}/{part}"));
-            assert!(of(&pooled, "half_width") < 0.8 * of(&one, "half_width"), "{i} {what}");
-            let error = (of(&pooled, "value") - truth).abs();
-            assert!(error < 2.0 * of(&pooled, "half_width"), "{i} {what}: {error}");
-        }
-    }
-    // Each tone is sought where it is.
-    let given = calibrated(&all, &["--tone", "161.3MHz,83.9MHz,61.3MHz"]);
-    for pointer in ["/channels/1/delay_samples/value", "/channels/3/gain/value"] {
-        assert!((number(&given, pointer) - number(&pooled, pointer)).abs() < 1e-9, "{pointer}: {given}");
-    }
-    let tail = ["--interleaved", "4", "--full-scale", "12bits", "-o", "x.toml", "--tone"];
-    let one_tone = [&["calibrate", "spec.toml"], &all[..], &tail, &["61.3MHz"]].concat();
-    desk.refused(1, &one_tone, &["z2.txt", "none of the tones given", "lines appear at"]);
-    // An amplifier of one channel was touched between the captures.
-    let mut touched = captured(&[113.9e6], 0.8, 2048, &mut dice);
-    touched[2].iter_mut().for_each(|x| *x = ((f64::from(*x) * 0.97 / STEP).round() * STEP) as f32);
-    write_codes(&desk, "z4.txt", &touched);
-    let four = ["z1.txt", "z2.txt", "z3.txt", "z4.txt"];
-    let refused = [&["calibrate", "spec.toml"], &four[..], &tail[..6]].concat();
-    let shown = desk.run(&refused, b"");
-    let shown = (shown.status.code(), text(&shown.stderr));
-    assert!(shown.0 == Some(1) && shown.1.contains("z4.txt contradicts the other captures"), "{shown:?}");
-}
-
 /// Bits of the converter for its codes in a table, and `fit` of the spec in place of the option.
 #[test]
 fn bits_of_codes_and_what_the_spec_fits() {
@@ -350,39 +253,6 @@ fn values_that_the_captures_contradict_are_not_written() {
     assert!(code == Some(1) && shown.contains("channel 1 has no stage 2"), "{shown}");
     let (code, shown) = run(&["--fit", "delay,cutof"]);
     assert!(code == Some(2) && shown.contains("cutoff:2 for the second stage"), "{shown}");
-}
-
-#[test]
-fn what_cannot_be_calibrated_is_refused_with_the_reason() {
-    let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(4));
-    let channels = captured(&[61.3e6], 0.9, 4096, &mut dice);
-    let names = write(&desk, "t", &channels);
-    let swapped: Vec<String> = [0, 2, 1, 3].map(|i| names[i].clone()).to_vec();
-    let refused = |names: &[String], tail: &[&str], code: i32, parts: &[&str]| {
-        desk.refused(code, &with(&["calibrate", "spec.toml", "-o", "x.toml"], names, tail), parts)
-    };
-    refused(&swapped, &["--tone", "61.3MHz"], 1, &["wrong order", "1, 3, 2, 4"]);
-    refused(&[0, 0, 2, 3].map(|i| names[i].clone()), &[], 1, &["captures 1 and 2 hold the same samples"]);
-    refused(
-        &names,
-        &["--tone", "125MHz"],
-        1,
-        &["multiple of half the slow rate", "choose another frequency"],
-    );
-    refused(
-        &names,
-        &["--tone", "61.3MHz", "--fit", "cutoff,delay"],
-        1,
-        &["at least 3 tones, and there are 1"],
-    );
-    refused(&names, &["--reference", "5"], 1, &["the channels are 1 to 4"]);
-    refused(&names, &["--tone", "61.3 parsec"], 2, &["--tone"]);
-    refused(&names, &["--tone", "auto", "--blind"], 2, &["cannot be used with"]);
-    refused(&names[..3], &[], 1, &["the spec has 4 channels, but the input has 3"]);
-    let noise: Vec<f32> = (0..5000).map(|_| dice.sample() as f32).collect();
-    wav::write(&desk, "noise.wav", 1, 1_000_000_000, &noise);
-    refused(&names, &["--training", "noise.wav"], 1, &["waveform"]);
-    desk.refused(1, &with(&["calibrate", "spec.toml", "-o", "t1.wav", "--force"], &names, &[]), &["t1.wav"]);
 }
 
 /// `fuse` and `stream` say when captures are in the wrong order, given twice, or late.

@@ -58,44 +58,6 @@ fn errors_of_the_converters_are_echoed_and_have_their_closed_form() {
     }
 }
 
-#[test]
-fn noise_jitter_and_bits_have_their_powers_and_their_seed() {
-    let desk = Desk::with_spec(THESIS);
-    let (_, ideal) = imperfect_captures(&desk, "ideal", &[]);
-    let error = |folder: &str, more: &[&str]| {
-        let (report, captures) = imperfect_captures(&desk, folder, more);
-        let difference =
-            |i: usize| -> Vec<f64> { captures[i].iter().zip(&ideal[i]).map(|(a, b)| a - b).collect() };
-        assert!(difference(2).iter().all(|&x| x == 0.0));
-        let rms = |x: Vec<f64>| (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
-        (report, [rms(difference(0)), rms(difference(1))])
-    };
-    // 20,000 samples: the standard deviation of an rms is 0.5 %. The tone has the amplitude 0.25 / 0.74.
-    let amplitude = 0.25 / 0.74;
-    let slope = amplitude * 0.7 / 2f64.sqrt();
-    for (folder, more, want) in [
-        ("noise", ["--noise", "2e-3", "--seed", "7"], 2e-3),
-        ("jitter", ["--jitter", "0.001samples", "--seed", "7"], slope * 1e-3),
-        ("bits", ["--bits", "10", "--seed", "7"], 0.5f64.powi(9) / 12f64.sqrt()),
-    ] {
-        let (report, found) = error(folder, &more);
-        for rms in found {
-            assert!((rms / want - 1.0).abs() < 0.025, "{folder}: {rms:e} instead of {want:e}");
-        }
-        assert_eq!(report["seed"], 7);
-    }
-    let (report, _) = error("all", &["--noise", "2e-3", "--jitter", "1e-3", "--bits", "10", "--seed", "8"]);
-    assert_eq!(
-        (number(&report, "/noise"), number(&report, "/jitter"), &report["bits"]),
-        (2e-3, 1e-3, &Value::from(10))
-    );
-    let again = |folder: &str, seed: &str| {
-        imperfect_captures(&desk, folder, &["--noise", "2e-3", "--seed", seed]).1[1].clone()
-    };
-    assert_eq!(again("again", "7"), recording(&desk.path("noise/ch2.wav")).1);
-    assert_ne!(again("other", "9"), recording(&desk.path("noise/ch2.wav")).1);
-}
-
 /// Cut-offs off by their errors are those of a spec that says so; with `fit` of one stage, of that stage.
 #[test]
 fn errors_of_cut_offs_are_those_of_other_front_ends() {

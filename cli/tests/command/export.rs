@@ -203,28 +203,6 @@ assert m['ratio'].item() == 2
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-#[test]
-fn refusals_name_the_remedy() {
-    let desk = Desk::with_spec(THESIS);
-    desk.good(&["design", "spec.toml", "-o", "b.json"]);
-    desk.refused(1, &["export", "b.json", "--format", "coe", "-o", "x.coe"], &["b.json", "--bits"]);
-    desk.refused(
-        1,
-        &["export", "b.json", "--format", "c", "-o", "x.h", "--name", "1x"],
-        &["\"1x\"", "C identifier"],
-    );
-    desk.refused(1, &["export", "spec.toml", "--format", "csv", "-o", "x.csv"], &["this is a spec"]);
-    desk.refused(1, &["export", "b.json", "--format", "csv", "-o", "b.json", "--force"], &["b.json"]);
-    assert!(
-        desk.good(&["export", "b.json", "--format", "csv", "-o", "-"])
-            .starts_with("channel,phase,lag,value\n1,0,0,")
-    );
-    // The extension says the format; others need the option.
-    desk.good(&["export", "b.json", "-o", "t.csv"]);
-    assert!(desk.read("t.csv").starts_with(b"channel,phase,lag,value\n1,0,0,"));
-    desk.refused(2, &["export", "b.json", "-o", "t.txt"], &["t.txt", "--format c"]);
-}
-
 /// What was exported comes back with the gamma that it had, proven again.
 #[test]
 fn taps_of_other_tools_are_judged() {

@@ -1,6 +1,5 @@
 //! The command `fuse`, as a user runs it.
 
-mod gaps;
 mod recordings;
 mod turns;
 

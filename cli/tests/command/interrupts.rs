@@ -1,7 +1,7 @@
 //! Interrupts of commands that compute, which end at once, and of a design, which ends with what it has.
 
-use crate::support::blocked::{until_a_thread_begins, until_a_thread_has_ended};
-use crate::support::{Desk, INT, TERM, THESIS, ending_signals, names, send, text, wav};
+use crate::support::blocked::until_a_thread_begins;
+use crate::support::{Desk, INT, TERM, THESIS, ending_signals, names, send, text};
 use std::process::{Child, Output};
 use std::time::Duration;
 
@@ -19,13 +19,6 @@ fn until(is_so: impl Fn() -> bool) {
     }
 }
 
-/// Noise in two recordings of so many samples.
-fn recorded(desk: &Desk, samples: usize) {
-    let mut dice = crate::support::random::Random(7);
-    let mut noise = || (0..samples).map(|_| 0.5 * dice.sample() as f32).collect::<Vec<_>>();
-    wav::write_pair(desk, &noise(), &noise());
-}
-
 /// The first recording is whole, without its name yet, while the second one is computed.
 #[test]
 fn a_signal_ends_a_simulation_and_leaves_no_file() {
@@ -40,40 +33,6 @@ fn a_signal_ends_a_simulation_and_leaves_no_file() {
         assert_eq!(interrupted(child, signal), "");
         assert_eq!(names(&captures), Vec::<String>::new());
     }
-}
-
-/// What was read before does not take the interrupt.
-#[test]
-fn a_signal_ends_a_calibration_after_its_captures_are_read() {
-    let desk = Desk::with_spec(THESIS);
-    recorded(&desk, 3_000_000);
-    let calibrate = ["calibrate", "spec.toml", "a.wav", "b.wav", "--blind", "-o", "calibrated.toml"];
-    let child = desk.spawn(&calibrate);
-    until_a_thread_has_ended(child.id(), "input");
-    interrupted(child, INT);
-    assert_eq!(names(&desk.path("")), ["a.wav", "b.wav", "spec.toml"]);
-}
-
-#[test]
-fn a_signal_ends_an_alignment_after_its_recordings_are_read() {
-    let desk = Desk::with_spec(THESIS);
-    recorded(&desk, 3_000_000);
-    let child = desk.spawn(&["align", "spec.toml", "a.wav", "b.wav", "-o", "aligned"]);
-    until_a_thread_has_ended(child.id(), "input");
-    interrupted(child, INT);
-    assert_eq!(names(&desk.path("")), ["a.wav", "b.wav", "spec.toml"]);
-}
-
-/// The fused recording has its name by then and keeps it.
-#[test]
-fn a_signal_ends_the_measurement_of_what_was_fused() {
-    let desk = Desk::new();
-    recorded(&desk, 1 << 21);
-    let child = desk.spawn(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--measure"]);
-    until(|| desk.path("out.wav").exists());
-    interrupted(child, INT);
-    assert_eq!(names(&desk.path("")), ["a.wav", "b.wav", "bank.json", "out.wav"]);
-    assert_eq!(wav::samples(&desk, "out.wav").len(), 1 << 22);
 }
 
 /// A design that takes minutes, as soon as it has begun.

@@ -168,70 +168,6 @@ fn sigmf_that_is_not_all_samples_is_read_or_refused() {
 }
 
 #[test]
-fn sigmf_goes_through_stream_in_every_type() {
-    let desk = Desk::new();
-    // Every sum is a multiple of 1/128 and below 1, so that even 8 bits hold it.
-    desk.write(
-        "small.json",
-        String::from_utf8(desk.read("bank.json")).unwrap().replace("[10, 20, 30, 0]", "[1, 0, 0, 2]"),
-    );
-    let input: Vec<f32> = frames(300).iter().map(|x| x / 128.0).collect();
-    let want = desk.run(&["stream", "small.json"], &bytes(&input)).stdout;
-    let encode = |name: &str, x: f64| match name {
-        "ri8" => vec![(x * 128.0) as i8 as u8],
-        "ru8" => vec![(x * 128.0 + 128.0) as u8],
-        "ri16_le" => ((x * 32768.0) as i16).to_le_bytes().to_vec(),
-        "ri16_be" => ((x * 32768.0) as i16).to_be_bytes().to_vec(),
-        "ri24_le" => ((x * 8388608.0) as i32).to_le_bytes()[..3].to_vec(),
-        "ri24_be" => ((x * 8388608.0) as i32).to_be_bytes()[1..].to_vec(),
-        "ri32_le" => ((x * 2147483648.0) as i32).to_le_bytes().to_vec(),
-        "ri32_be" => ((x * 2147483648.0) as i32).to_be_bytes().to_vec(),
-        "rf32_le" => (x as f32).to_le_bytes().to_vec(),
-        "rf32_be" => (x as f32).to_be_bytes().to_vec(),
-        "rf64_le" => x.to_le_bytes().to_vec(),
-        _ => x.to_be_bytes().to_vec(),
-    };
-    let coded = |name: &str, samples: &[f32]| -> Vec<u8> {
-        samples.iter().flat_map(|&x| encode(name, f64::from(x))).collect()
-    };
-    for (name, pcm) in [
-        ("ri8", "s8"),
-        ("ru8", "u8"),
-        ("ri16_le", "s16le"),
-        ("ri16_be", "s16be"),
-        ("ri24_le", "s24le"),
-        ("ri24_be", "s24be"),
-        ("ri32_le", "s32le"),
-        ("ri32_be", "s32be"),
-        ("rf32_le", "f32le"),
-        ("rf32_be", "f32be"),
-        ("rf64_le", "f64le"),
-        ("rf64_be", "f64be"),
-    ] {
-        desk.write("both.sigmf-meta", meta(name, 2, ""));
-        desk.write("both.sigmf-data", coded(name, &input));
-        for i in 0..2 {
-            desk.write(&format!("{i}.sigmf-meta"), meta(name, 1, r#"{ "core:sample_start": 0 }"#));
-            desk.write(&format!("{i}.sigmf-data"), coded(name, &channel(&input, i)));
-        }
-        // One of two channels, and two of one; raw samples and a recording out.
-        let both = ["stream", "small.json", "--input", "both.sigmf-data", "--output-format", "f32le"];
-        let output = desk.run(&both, &[]);
-        assert!(
-            output.status.success() && output.stderr.is_empty() && output.stdout == want,
-            "{name}: {output:?}"
-        );
-        let apart = ["--input", "0.sigmf-meta", "--input", "1.sigmf-meta", "--output-format", pcm];
-        let report = desk.report(&[&["stream", "small.json", "-o", "out.sigmf-meta"], &apart[..]].concat());
-        assert_eq!((report["samples"].as_u64(), &report["warnings"]), (Some(600), &json!([])));
-        assert_eq!(desk.read("out.sigmf-data"), coded(name, &floats(&want)), "{name}");
-        let written: Value = serde_json::from_slice(&desk.read("out.sigmf-meta")).unwrap();
-        assert_eq!(written["global"]["core:datatype"], name);
-        assert_eq!(written["global"]["core:sample_rate"], 48001.0);
-    }
-}
-
-#[test]
 fn captures_tell_stream_what_was_lost() {
     let desk = Desk::new();
     let whole = whole();
@@ -259,37 +195,4 @@ fn captures_tell_stream_what_was_lost() {
     assert_eq!(desk.report(&both)["gaps"]["list"][3], gaps(&[(2, 2990, 3)])[0]);
     desk.write("lost", r#"{"channel": 2, "sample_start": 0, "global_index": 3}"#);
     desk.refused(1, &[&both[..], &["--force"]].concat(), &["b.sigmf-meta", "captures of its own"]);
-}
-
-#[test]
-fn faults_are_reported_with_their_place() {
-    let desk = Desk::new();
-    desk.write("a", bytes(&[1.0; 20]));
-    let args = ["stream", "bank.json", "--input", "a", "--input", "a", "-o", "out"];
-    desk.refused(2, &[&args[..], &["--lost", "lost"]].concat(), &["--gaps"]);
-    let lost = [&args[..], &["--gaps", "zero", "--lost", "lost"]].concat();
-    desk.refused(1, &lost, &["lost: cannot read it"]);
-    for (line, parts) in [
-        ("{\"channel\": 1,\n", &["lost: line 1", "the text ends inside"][..]),
-        ("\n{\"channel\": 3, \"first\": 0, \"length\": 1}", &["lost: channel 3", "there are 2"]),
-        ("{\"sample_start\": 4, \"global_index\": 3}", &["before 0"]),
-        (
-            "\n{\"channel\": 2, \"sample_start\": 4, \"global_index\": 9}",
-            &["lost: line 2", "channel 2", "sample 4"],
-        ),
-        (
-            r#"{"channel": 1, "sample_start": 0, "global_index": 999999999999}
-            {"channel": 2, "sample_start": 0, "global_index": 0}"#,
-            &["a: ", "mistake"],
-        ),
-    ] {
-        desk.write("lost", line);
-        desk.refused(1, &lost, parts);
-    }
-    // Numbers beyond the end are reported, and are an error only where asked for.
-    let beyond = r#"{"sample_start": 0, "global_index": 0}
-        {"channel": 1, "sample_start": 30, "global_index": 31}"#;
-    desk.write("lost", beyond);
-    let report = desk.report(&lost);
-    assert!(report["warnings"][0].as_str().unwrap().contains("ends before the last"), "{report}");
 }

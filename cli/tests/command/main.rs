@@ -22,7 +22,6 @@ mod export;
 mod faults;
 mod formats;
 mod fuse;
-mod impossible;
 #[cfg(target_os = "linux")]
 mod interrupts;
 #[cfg(unix)]
@@ -40,7 +39,6 @@ mod rates;
 mod report;
 mod schema;
 mod simulate;
-mod snapshots;
 #[cfg(unix)]
 mod stream;
 mod understanding;

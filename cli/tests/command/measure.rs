@@ -192,36 +192,6 @@ fn clipping_and_hidden_spurs_are_said() {
     assert!(text(&output.stderr).contains("gain or skew, 1/2 fs - f"), "{}", text(&output.stderr));
 }
 
-#[test]
-fn what_cannot_be_measured_is_refused() {
-    let desk = Desk::with_spec(THESIS);
-    wav::write(&desk, "x.wav", 1, 48_000, &capture(6000, 4321.0));
-    wav::write(&desk, "flat.wav", 1, 48_000, &[0.5; 1000]);
-    wav::write(&desk, "empty.wav", 1, 48_000, &[]);
-    wav::write(&desk, "short.wav", 1, 48_000, &capture(100, 4321.0));
-    desk.refused(1, &["measure", "flat.wav"], &["flat.wav", "no tone found"]);
-    let decay: Vec<f32> = (0..4000u16).map(|n| (-f32::from(n) / 500.0).exp()).collect();
-    let ramp: Vec<f32> = (0..4000u16).map(|n| f32::from(n) / 4000.0).collect();
-    for trend in [decay, ramp] {
-        wav::write(&desk, "trend.wav", 1, 48_000, &trend);
-        desk.refused(1, &["measure", "trend.wav"], &["trend.wav", "no tone found: "]);
-    }
-    desk.refused(1, &["measure", "empty.wav"], &["empty.wav", "no samples"]);
-    desk.refused(1, &["measure", "short.wav", "--interleaved", "16"], &["short.wav", "too few", "harmonics"]);
-    let missing = ["x.wav", "no tone found near 9000 Hz", "the only line of the record appears at 4321.0"];
-    desk.refused(1, &["measure", "x.wav", "--tone", "9kHz"], &missing);
-    desk.refused(2, &["measure", "x.wav", "--tone", "fast"], &["fast", "auto"]);
-    desk.refused(1, &["measure", "x.wav", "--tone", "-3"], &["x.wav", "-3", "above 0"]);
-    desk.refused(2, &["measure", "x.wav", "--tone", "0"], &["other than 0"]);
-    desk.refused(2, &["measure", "x.wav", "--tone", "auto,4321"], &["not both"]);
-    desk.refused(2, &["measure", "x.wav", "--full-scale", "0"], &["--full-scale", "1e-30 to 1e30"]);
-    desk.refused(2, &["measure", "x.wav", "--full-scale", "128"], &["--full-scale 128", "by its format"]);
-    desk.refused(2, &["measure", "x.wav", "--interleaved", "0"], &["0"]);
-    desk.refused(1, &["measure", "none.wav"], &["none.wav"]);
-    desk.write("x.csv", "0.1\n0.2\n0.3\n");
-    desk.refused(1, &["measure", "x.wav", "--ref", "x.csv"], &["x.csv", "--rate 48kHz", "column is `time`"]);
-}
-
 /// Raw recordings have raw references, unless the name of one says its format.
 #[test]
 fn a_reference_has_the_format_of_the_recording() {

@@ -238,28 +238,6 @@ fn recordings_must_have_the_rates_of_their_converters() {
     );
 }
 
-/// Sizes beyond a minimax design are named, with near rates and the way out.
-#[test]
-fn long_frames_are_refused_with_their_numbers() {
-    let long = "fast_rate = 96000\ntarget = { filter = { family = \"butterworth\", order = 4, cutoff = 18000 } }\n\
-                channel = [{ delay = 0, rate = 44100 }, { delay = 0, rate = 48000 }]\n";
-    let desk = Desk::with_spec(&format!("{long}design = {{ method = \"iir\" }}\n"));
-    let near = ["320 fast samples", "147 and 160", "ratios of small numbers", "h2 with taps"];
-    desk.refused(1, &["design", "spec.toml", "-o", "x.json"], &near);
-    desk.write("odd.toml", long.replace("44100", "44100.5"));
-    desk.refused(
-        1,
-        &["design", "odd.toml", "-o", "x.json"],
-        &["44100.5 Hz", "no simple ratio", "odd.toml:3:"],
-    );
-    desk.write("early.toml", SPEC.replace("latency = 22", "latency = 3"));
-    desk.refused(1, &["design", "early.toml", "-o", "x.json"], &["latency", "give 4 or more"]);
-    desk.write("both.toml", SPEC.replace("latency = 22", "latency = 22\nratio = 4"));
-    desk.refused(1, &["design", "both.toml", "-o", "x.json"], &["ratio", "leave ratio out"]);
-    desk.write("none.toml", SPEC.replace("rate = \"16 kHz\"\n", ""));
-    desk.refused(1, &["design", "none.toml", "-o", "x.json"], &["ratio", "the rate of every channel"]);
-}
-
 /// Delays, gains and offsets per converter, from recordings at their own rates.
 #[test]
 fn converters_of_unequal_rates_are_calibrated_by_tones() {

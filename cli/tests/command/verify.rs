@@ -159,35 +159,6 @@ fn every_mutation_of_a_bank_file_is_refused() {
     println!("{refused} mutations refused, {unchanged} changes that change nothing passed");
 }
 
-/// Without the digest the proof stands alone: what it lets pass must be true.
-#[test]
-fn what_the_proof_alone_lets_pass_is_true() {
-    let mut dice = Random(7);
-    let (mut passed, mut refused) = (0, 0);
-    for method in ["fir", "iir"] {
-        let text = designed(method).to_json().unwrap();
-        let open = text.find("\"digest\"").unwrap();
-        let text = text[..open].trim_end().trim_end_matches(',').to_owned() + "\n}\n";
-        for _ in 0..300 {
-            let Ok(bank) = Bank::from_json(&mutated(&text, &mut dice), "b.json") else { continue };
-            match verify(&bank) {
-                Err(_) => refused += 1,
-                Ok(proven) => {
-                    passed += 1;
-                    let gamma = analyze(&bank, &[]).unwrap().gamma;
-                    let holds =
-                        proven.attained <= gamma * (1.0 + 1e-9) && gamma <= proven.upper * (1.0 + 1e-12);
-                    assert!(holds, "{gamma} {proven:?}");
-                    let stated = bank.gamma.norm.unwrap_or(gamma);
-                    assert!((stated / gamma - 1.0).abs() < 1e-6, "{stated} {gamma}");
-                }
-            }
-        }
-    }
-    println!("by the proof alone: {refused} refused, {passed} passed and true");
-    assert!(refused > passed, "{refused} {passed}");
-}
-
 #[test]
 fn the_intervals_of_the_ready_banks_are_narrow_and_hold_their_gamma() {
     for (name, text) in files() {
@@ -224,17 +195,6 @@ fn desk() -> Desk {
     desk
 }
 
-/// Verifies an altered file and wants it refused in one line.
-fn refused(desk: &Desk, altered: &str, parts: &[&str]) {
-    desk.write("bad.json", altered);
-    let message = desk.refused(1, &["verify", "bad.json"], parts);
-    assert!(message.starts_with("hybank: bad.json: ") && message.lines().count() == 1, "{message}");
-}
-
-fn json(text: &str) -> Value {
-    serde_json::from_str(text).unwrap()
-}
-
 fn pretty(value: &Value) -> String {
     serde_json::to_string_pretty(value).unwrap()
 }
@@ -256,50 +216,11 @@ fn a_designed_bank_verifies() {
     // Another layout of the same content is the same bank.
     desk.write("loose.json", pretty(&bank));
     assert!(desk.good(&["verify", "loose.json"]).contains("digest     matches"));
-}
-
-#[test]
-fn altered_files_are_refused_with_the_place() {
-    let desk = desk();
-    let bank = desk.read_json("bank.json");
-    let change = |pointer: &str, value: Value, digest: bool| {
-        let mut changed = bank.clone();
-        *changed.pointer_mut(pointer).unwrap() = value;
-        if !digest {
-            changed["digest"] = Value::Null;
-        }
-        pretty(&changed)
-    };
-    let tap = bank["channels"][0]["taps"][3].as_f64().unwrap();
-    let upper = bank["gamma"]["upper"].as_f64().unwrap();
-    refused(
-        &desk,
-        &change("/channels/0/taps/3", (tap * (1.0 + 1e-15)).into(), true),
-        &["digest: ", "altered"],
-    );
-    refused(&desk, &change("/channels/0/taps/3", (tap + 1e-3).into(), false), &["proof.upper: "]);
-    refused(&desk, &change("/gamma/upper", (upper * (1.0 - 1e-7)).into(), false), &["gamma.upper: "]);
-    refused(&desk, &change("/gamma/norm", (upper * (1.0 - 1e-6)).into(), false), &["gamma.norm: "]);
-    refused(&desk, &change("/gamma/lower", (upper * 1.001).into(), false), &["gamma.lower: "]);
-    refused(&desk, &change("/proof/upper/gamma", (upper * 0.9999).into(), false), &["proof.upper: "]);
-    refused(
-        &desk,
-        &change("/proof/upper/factor/2/1", 0.5.into(), false),
-        &["proof.upper: ", "design the bank again"],
-    );
-    refused(
-        &desk,
-        &change("/proof/upper/factor/2", Value::Array(vec![]), false),
-        &["proof.upper.factor[2]: "],
-    );
-    refused(
-        &desk,
-        &change("/proof/upper/peak/half", json("[0.0, 0.0]"), false),
-        &["proof.upper.peak.half: "],
-    );
-    refused(&desk, &change("/digest", "sha256:12".into(), true), &["digest: ", "64 hexadecimal"]);
-    refused(&desk, &change("/spec", Value::Null, false), &["spec: ", "null"]);
-    refused(&desk, "{", &["line 1"]);
+    let mut altered = bank;
+    altered["latency"] = 2.into();
+    altered["spec"]["latency"] = 2.into();
+    desk.write("altered.json", pretty(&altered));
+    desk.refused(1, &["verify", "altered.json"], &["altered.json: digest: ", "altered"]);
 }
 
 #[test]

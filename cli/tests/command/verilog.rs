@@ -1,7 +1,6 @@
 //! Exported Verilog in the hands of Icarus Verilog, Verilator and Yosys, as far as they are there.
 
-use crate::support::random::Random;
-use crate::support::{Desk, THESIS, number, text};
+use crate::support::{Desk, number, text};
 use hybank::bank::{Bank, FixedPoint, SynthesisFilters};
 use hybank::spec::WordLengths;
 use serde_json::Value;
@@ -279,49 +278,6 @@ fn a_small_circuit_is_proven() {
     }
 }
 
-/// N and M of 1 to 8, 2 to 64 taps of 4 to 18 bits, 1, 2, 4 and 8 clocks, a million frames, compiled.
-#[test]
-fn random_banks_have_no_differing_bit_in_a_million_frames() {
-    if !trials::is_slow("a million frames of random banks in Verilator") {
-        return;
-    }
-    for seed in trials::trials(20) {
-        let mut random = Random(seed + 1);
-        let (n, ratio, taps) = (random.count(1, 8), random.count(1, 8), random.count(2, 64));
-        let bits = random.count(4, 18) as u32;
-        let most = 1_i64 << (bits - 1);
-        let tap = |random: &mut Random| random.below(2 * most as usize) as i64 - most;
-        let integers = (0..n).map(|_| (0..taps).map(|_| tap(&mut random)).collect()).collect();
-        let desk = Desk::empty();
-        let fraction_bits = random.count(0, bits as usize + 3) as i32;
-        write_bank(&desk, integers, bits, fraction_bits, ratio);
-        let clocks = ["1", "2", "4", "8"][seed as usize % 4];
-        let input = random.count(4, 16).to_string();
-        let pipeline = random.count(1, 3).to_string();
-        let flags = ["--input-bits", &input, "--clocks-per-frame", clocks];
-        let more = ["--pipeline", &pipeline, "--random-frames", "1000000"];
-        let report = exported(&desk, &[&flags[..], &more].concat());
-        let line = [
-            "verilator",
-            "--binary",
-            "--timing",
-            "-Wno-fatal",
-            "-O3",
-            "--top-module",
-            "core_tb",
-            "core.v",
-            "core_tb.v",
-        ];
-        let Some((is_good, said)) = tool(&desk, &line) else { return };
-        assert!(is_good, "{seed}: {said}");
-        let program = desk.path("obj_dir/Vcore_tb");
-        let output = Command::new(program).current_dir(desk.path("")).output().unwrap();
-        let said = text(&output.stdout);
-        println!("{seed}: N {n}, M {ratio}, {taps} taps of {bits} bits, C {clocks}: {report}");
-        assert!(said.contains("PASS") && !said.contains("FAIL"), "{seed} {flags:?} {report}: {said}");
-    }
-}
-
 /// Without a title, with one channel and one phase, and with fewer bits or clocks than one may think.
 #[test]
 fn the_header_and_the_warnings_say_what_the_circuit_does() {
@@ -347,45 +303,4 @@ fn the_header_and_the_warnings_say_what_the_circuit_does() {
     let (folded, said) = header(&["--clocks-per-frame", "100"]);
     assert!(folded.contains("every\n   2 clocks, when in_ready is there"), "{folded}");
     assert!(said.contains("warning: no more than 2 clocks have work in a frame"), "{said}");
-}
-
-#[test]
-fn verilog_that_cannot_be_is_refused() {
-    let desk = Desk::with_spec(THESIS);
-    desk.good(&["design", "spec.toml", "-o", "real.json"]);
-    let verilog = |bank: &'static str| ["export", bank, "-o", "core.v"];
-    let more = |bank: &'static str, flags: &[&'static str]| [&verilog(bank)[..], flags].concat();
-    for flags in [&["--input-bits", "8"][..], &[]] {
-        desk.refused(1, &more("real.json", flags), &["real.json", "integer taps", "--bits"]);
-    }
-    desk.good(&["design", "spec.toml", "-o", "b.json", "--bits", "8"]);
-    desk.refused(1, &verilog("b.json"), &["no channel of the spec", "--input-bits B"]);
-    for name in ["wire", "1a", "a b"] {
-        let flags = ["export", "b.json", "-o", "core.v", "--input-bits", "8", "--name", name];
-        desk.refused(1, &flags, &[name, "Verilog identifier"]);
-    }
-    for name in ["x1", "clk", "sum1"] {
-        let flags = ["export", "b.json", "-o", "core.v", "--input-bits", "8", "--name", name];
-        desk.refused(1, &flags, &[name, "name of a signal"]);
-    }
-    desk.refused(2, &more("b.json", &["--input-bits", "40"]), &["'40'", "--input-bits", "2..=32"]);
-    desk.refused(
-        2,
-        &more("b.json", &["--input-bits", "8", "--accumulator", "65"]),
-        &["--accumulator", "2..=64"],
-    );
-    let narrow = ["--input-bits", "8", "--accumulator", "3"];
-    desk.refused(1, &more("b.json", &narrow), &["accumulator of 3 bits", "fraction bits", "hold all sums"]);
-    desk.refused(2, &more("b.json", &["--input-bits", "8", "--pipeline", "0"]), &["--pipeline"]);
-    desk.refused(2, &["export", "b.json", "-o", "b.csv", "--output-bits", "8"], &["--format verilog"]);
-    let many = ["--input-bits", "8", "--testbench", "t", "--random-frames", "4294967295"];
-    desk.refused(1, &more("b.json", &many), &["4294967295 random frames", "ask for 1000000 at most"]);
-    assert!(!desk.path("t").exists());
-    desk.refused(2, &["export", "b.json", "-o", "-", "--format", "verilog", "--json"], &["--json"]);
-    assert!(!desk.path("core.v").exists());
-    // Without a name of its own the module has that of the file; the bits are those of the converters.
-    desk.write("wide.toml", THESIS.replace("delay = 1.2", "delay = 1.2\nbits = 10"));
-    desk.good(&["design", "wide.toml", "-o", "wide.json", "--bits", "8"]);
-    let code = desk.good(&["export", "wide.json", "--format", "verilog", "-o", "-"]);
-    assert!(code.contains("module bank (") && code.contains("input wire signed [9:0] x1"), "{code}");
 }

@@ -1,4 +1,4 @@
-//! Campaigns of random trials: forged banks, damaged inputs, and foreign text.
+//! Campaigns of random trials: damaged inputs and foreign text.
 //!
 //! Every run makes a short campaign with the same seeds.
 //! `HYBANK_CAMPAIGN=50 cargo test --release --test robustness -- --nocapture` makes 50 times as many trials;
@@ -8,9 +8,7 @@
 mod support;
 
 mod foreign;
-mod forged;
 mod inputs;
-mod norm;
 mod parsers;
 
 use support::random::Random;

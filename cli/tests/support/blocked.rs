@@ -51,9 +51,3 @@ fn has_thread(process: u32, name: &str) -> bool {
 pub(crate) fn until_a_thread_begins(process: u32, name: &str) {
     until(|| has_thread(process, name), "the thread does not begin");
 }
-
-/// Waits until a process has had a thread of this name, and has none any more.
-pub(crate) fn until_a_thread_has_ended(process: u32, name: &str) {
-    until_a_thread_begins(process, name);
-    until(|| !has_thread(process, name), "the thread goes on");
-}

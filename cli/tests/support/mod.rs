@@ -9,7 +9,6 @@ pub(crate) use trials::random;
 pub(crate) mod schema;
 #[path = "../../../tests/support/specs.rs"]
 pub(crate) mod specs;
-#[path = "../../../tests/support/sweep.rs"]
 pub(crate) mod sweep;
 pub(crate) mod wav;
 

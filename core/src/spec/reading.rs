@@ -27,9 +27,19 @@ pub(super) fn of_toml<T: DeserializeOwned>(text: &str) -> Result<T, SpecError> {
 }
 
 fn in_toml(text: &str, error: &toml::de::Error, path: &str) -> SpecError {
-    let span = error.span().or_else(|| span_of(text, path));
+    let span = error.span().or_else(|| span_of(text, path)).or_else(|| line_of(text, error.message()));
     let location = span.map(|span| Location::find(text, span));
     refusal(error.message(), path).with_homes(tables_with).located(location)
+}
+
+/// The line with which the parser begins to say `message`, which has no place of its own.
+fn line_of(text: &str, message: &str) -> Option<Range<usize>> {
+    let ends: Vec<usize> = text.match_indices('\n').map(|(end, _)| end).chain([text.len()]).collect();
+    let is_fine =
+        |end: &usize| DeTable::parse(&text[..*end]).err().is_none_or(|error| error.message() != message);
+    let line = ends.partition_point(is_fine);
+    let start = if line == 0 { 0 } else { ends[line - 1] + 1 };
+    Some(start..*ends.get(line)?)
 }
 
 /// Reads data of any format; the path of keys says where a fault is.

@@ -14,8 +14,6 @@ mod page;
 mod scanlines;
 mod spatial;
 mod tables;
-// Parts of it are used by its tests only, `tests/thesis.rs`.
-#[allow(dead_code, unreachable_pub, unused_imports)]
 mod theory;
 
 use hybank::plot::{Chart, Series};

@@ -4,8 +4,7 @@
 //!
 //! * **local limit**: what the error does not exceed where slopes, second differences and residuals are at
 //!   most those of the photographs nearby. It is not sure: photographs break it where surfaces reflect,
-//!   where depth is wrong in all views, and where something lies between the samples. The example
-//!   `sure_bound` has a bound within limits that are known for sure;
+//!   where depth is wrong in all views, and where something lies between the samples;
 //! * **expected**: the root of the expected square. By Jensen's inequality the expected error is not larger;
 //! * **estimate**: the expected absolute error against a photograph from the place of the virtual camera.
 //!

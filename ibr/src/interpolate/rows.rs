@@ -21,8 +21,8 @@ pub(crate) const ORDER: usize = 4;
 /// Distance outside the image up to which samples are used, in pixels.
 pub const MARGIN: f64 = (ORDER - 2) as f64;
 
-/// Work memory of the row fit, reused from row to row. `ibr/tests/allocation.rs` runs the three stages of
-/// rows one after the other.
+/// Work memory of the row fit, reused from row to row. `ibr/tests/views/allocation.rs` runs the three stages
+/// of rows one after the other.
 #[derive(Debug, Clone)]
 pub struct RowWork<const C: usize> {
     fit: Fit<ORDER, C>,

@@ -103,7 +103,7 @@ const SCATTERED_SLOPE: f64 = 0.015;
 /// Lengths of paths from which on a value is a guess, in lower quartiles of these lengths: a quarter of the
 /// image has samples about it even where a sky has none. In a photograph of one colour with samples at
 /// random these are three mean distances of samples, and one pixel in 10^12 is farther away. On the scenes
-/// of the example `damaged_depth` it is one in 500.
+/// of `ibr/tests/views/damaged_depth` it is one in 500.
 const FAR: f32 = 10.0;
 
 /// Depths for all pixels from those of a few.

@@ -117,23 +117,3 @@ fn timestamps_count_whole_turns() {
         &["capture.sigmf-meta", "global_index 8", "beginning of a frame of 3 time-interleaved"],
     );
 }
-
-#[test]
-fn what_cannot_take_turns_is_refused() {
-    let desk = Desk::empty();
-    write_bank(&desk, [0.0, 2.0, 1.0]);
-    wav::write(&desk, "capture.wav", 1, 48_000, &capture(4));
-    wav::write(&desk, "wide.wav", 3, 16_000, &capture(4));
-    let fuse =
-        |args: &[&'static str]| [&["fuse", "three.json", "-o", "y.wav", "--interleaved"], args].concat();
-    desk.refused(2, &fuse(&["2", "capture.wav"]), &["there are 3 channels", "give 3"]);
-    desk.refused(
-        2,
-        &fuse(&["3", "capture.wav", "wide.wav"]),
-        &["2 inputs are given", "leave out --interleaved"],
-    );
-    desk.refused(2, &fuse(&["0", "capture.wav"]), &["--interleaved"]);
-    desk.refused(1, &fuse(&["3", "wide.wav"]), &["wide.wav: 3 channels", "not interleaved"]);
-    write_bank(&desk, [0.0, 3.0, 1.0]);
-    desk.refused(1, &fuse(&["3", "capture.wav"]), &["3 fast periods apart", "one recording per channel"]);
-}

@@ -1,35 +1,34 @@
 //! Scenes of the plane: painted curves, cameras with one row of pixels, and the bounds of chapter 3.
 //!
 //! A curve S(u) carries the texture T(u). Camera i sees it through H_i(u), which is monotone: nothing is
-//! hidden ([`occluded`] is for the rest). All cameras count in pixels, so cameras of different resolution
+//! hidden. All cameras count in pixels, so cameras of different resolution
 //! differ in their focal lengths.
 
 mod camera;
-pub mod occluded;
-pub mod scenes;
+pub(crate) mod scenes;
 mod theorem;
-pub mod trial;
+pub(crate) mod trial;
 
-pub use camera::{FlatCamera, Projection};
-pub use theorem::{ErrorBound, Errors, FlatRig, UNIFORM_ERROR_SHARE};
+pub(crate) use camera::FlatCamera;
+pub(crate) use theorem::{ErrorBound, Errors, FlatRig, UNIFORM_ERROR_SHARE};
 
 use nalgebra::Vector2;
 
 /// A point of a painted curve with its derivatives by u.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CurvePoint {
+pub(crate) struct CurvePoint {
     /// S(u).
-    pub point: Vector2<f64>,
+    pub(crate) point: Vector2<f64>,
     /// S'(u).
-    pub tangent: Vector2<f64>,
+    pub(crate) tangent: Vector2<f64>,
     /// S''(u).
-    pub bend: Vector2<f64>,
+    pub(crate) bend: Vector2<f64>,
     /// T, T' and T''.
-    pub texture: [f64; 3],
+    pub(crate) texture: [f64; 3],
 }
 
 /// A curve with a texture.
-pub trait PaintedCurve: Sync {
+pub(crate) trait PaintedCurve: Sync {
     /// The parameters of its ends.
     fn range(&self) -> (f64, f64);
     /// The point of parameter u.
@@ -65,6 +64,3 @@ pub(crate) fn parameter_at(curve: &dyn PaintedCurve, camera: &FlatCamera, x: f64
     }
     u
 }
-
-#[cfg(test)]
-pub(crate) mod tests;

@@ -1,4 +1,4 @@
-//! Theorems 3.1 and 3.2: the mean absolute error of a virtual view of an unoccluded scene of the plane.
+//! Theorem 3.1: the mean absolute error of a virtual view of an unoccluded scene of the plane.
 
 use super::{FlatCamera, PaintedCurve, cross};
 use crate::theory::periodic::PeriodicSets;
@@ -9,42 +9,42 @@ const NODES: usize = 4000;
 
 /// Bounds of the errors of the inputs.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Errors {
+pub(crate) struct Errors {
     /// E_T, of intensities.
-    pub texture: f64,
+    pub(crate) texture: f64,
     /// E_D, of depths along the rays of the actual cameras.
-    pub depth: f64,
+    pub(crate) depth: f64,
 }
 
 /// A bound of the mean absolute error, by cause.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ErrorBound {
+pub(crate) struct ErrorBound {
     /// Too few samples.
-    pub sampling: f64,
+    pub(crate) sampling: f64,
     /// Errors of intensity.
-    pub texture: f64,
+    pub(crate) texture: f64,
     /// Errors of depth.
-    pub depth: f64,
+    pub(crate) depth: f64,
 }
 
 impl ErrorBound {
     /// The sum.
-    pub fn total(&self) -> f64 {
+    pub(crate) fn total(&self) -> f64 {
         self.sampling + self.texture + self.depth
     }
 }
 
 /// A scene, the cameras that see it, and the virtual camera.
 #[derive(Clone, Copy)]
-pub struct FlatRig<'a> {
+pub(crate) struct FlatRig<'a> {
     /// The curve.
-    pub scene: &'a dyn PaintedCurve,
+    pub(crate) scene: &'a dyn PaintedCurve,
     /// The actual cameras.
-    pub cameras: &'a [FlatCamera],
+    pub(crate) cameras: &'a [FlatCamera],
     /// The virtual camera.
-    pub view: FlatCamera,
+    pub(crate) view: FlatCamera,
     /// The part of the curve that is judged, from one parameter to another.
-    pub window: (f64, f64),
+    pub(crate) window: (f64, f64),
 }
 
 /// Intensity of the virtual image f_v around one pixel, by the pixel.
@@ -70,21 +70,15 @@ impl FlatRig<'_> {
     }
 
     /// Samples of each camera per virtual pixel around the point of parameter u: |H_i'| / |H_v'|.
-    pub fn densities(&self, u: f64) -> Vec<f64> {
+    pub(crate) fn densities(&self, u: f64) -> Vec<f64> {
         let c = self.scene.at(u);
         let stretch = self.view.see(&c).first.abs();
         self.cameras.iter().map(|camera| camera.see(&c).first.abs() / stretch).collect()
     }
 
     /// lambda_x, samples per virtual pixel.
-    pub fn density(&self, u: f64) -> f64 {
+    pub(crate) fn density(&self, u: f64) -> f64 {
         self.densities(u).iter().sum()
-    }
-
-    /// lambda_u, samples per unit of u.
-    pub fn object_density(&self, u: f64) -> f64 {
-        let c = self.scene.at(u);
-        self.cameras.iter().map(|camera| camera.see(&c).first.abs()).sum()
     }
 
     /// Mean over the pixels of the virtual view of a function of u.
@@ -106,7 +100,7 @@ impl FlatRig<'_> {
     /// ```text
     /// mu = delta det(M_v) ((S - C_i) x (S - C_v)) / (d_i d_v d^_v)
     /// ```
-    pub fn jitter(&self, camera: usize, u: f64, delta: f64) -> f64 {
+    pub(crate) fn jitter(&self, camera: usize, u: f64, delta: f64) -> f64 {
         let (s, c) = (self.scene.at(u).point, self.cameras[camera].centre());
         let (d, d_v) = (self.cameras[camera].project(&s).1, self.view.project(&s).1);
         let moved = self.view.project(&(s + (s - c) * (delta / d))).1;
@@ -115,7 +109,7 @@ impl FlatRig<'_> {
     }
 
     /// B_v: the largest jitter per unit of depth error, for errors up to `depth_error`.
-    pub fn jitter_factor(&self, depth_error: f64) -> f64 {
+    pub(crate) fn jitter_factor(&self, depth_error: f64) -> f64 {
         let delta = depth_error.max(1e-9);
         let worst = |i: usize, u: f64| self.jitter(i, u, delta).abs().max(self.jitter(i, u, -delta).abs());
         let of_point = |u| (0..self.cameras.len()).map(|i| worst(i, u)).fold(0.0, f64::max);
@@ -123,7 +117,7 @@ impl FlatRig<'_> {
     }
 
     /// Suprema of the derivatives of the virtual image over the window.
-    pub fn smoothness(&self) -> Smoothness {
+    pub(crate) fn smoothness(&self) -> Smoothness {
         let slope = self.largest(|u| self.virtual_at(u).slope.abs());
         Smoothness { slope, curvature: self.largest(|u| self.virtual_at(u).curvature.abs()) }
     }
@@ -134,9 +128,8 @@ impl FlatRig<'_> {
     /// MAE <= (3/4) sup|f_v''| <lambda_x^-2> + E_T + E_D B_v sup|f_v'|
     /// ```
     ///
-    /// An expectation over independent, uniform phases of the cameras. For cameras that share a phase it is
-    /// false; [`crate::theory::piecewise_linear::PiecewiseLinear::mean_error_bound`] holds always.
-    pub fn image_space(&self, errors: Errors) -> ErrorBound {
+    /// An expectation over independent, uniform phases of the cameras.
+    pub(crate) fn image_space(&self, errors: Errors) -> ErrorBound {
         let Smoothness { slope, curvature } = self.smoothness();
         ErrorBound {
             sampling: 0.75 * curvature * self.mean(|u| self.density(u).powi(-2)),
@@ -145,30 +138,9 @@ impl FlatRig<'_> {
         }
     }
 
-    /// Theorem 3.2, for linear interpolation on the chords between the reconstructed points:
-    ///
-    /// ```text
-    /// MAE <= (3/4) (sup|T''| + sup|T'| G sup|S''| / min|H_v'|) <lambda_u^-2>
-    ///        + E_T + E_D B_v sup|T'| / min|H_v'|
-    /// ```
-    ///
-    /// G is the largest change of a virtual pixel per displacement of a point.
-    pub fn object_space(&self, errors: Errors) -> ErrorBound {
-        let paint = |k: usize| self.largest(|u| self.scene.at(u).texture[k].abs());
-        let bend = self.largest(|u| self.scene.at(u).bend.norm());
-        let sensitivity = self.largest(|u| self.view.sensitivity(&self.scene.at(u).point));
-        let least = 1.0 / self.largest(|u| 1.0 / self.virtual_at(u).stretch);
-        let curvature = paint(2) + paint(1) * sensitivity * bend / least;
-        ErrorBound {
-            sampling: 0.75 * curvature * self.mean(|u| self.object_density(u).powi(-2)),
-            texture: errors.texture,
-            depth: errors.depth * self.jitter_factor(errors.depth) * paint(1) / least,
-        }
-    }
-
     /// What Theorem 3.1 bounds, estimated for exact inputs: the mean of |f_v''| lambda E\[D^3\] / 12 with
     /// the exact moments of as many cameras as there are.
-    pub fn estimate(&self) -> f64 {
+    pub(crate) fn estimate(&self) -> f64 {
         self.mean(|u| {
             let periods = self.densities(u).iter().map(|d| 1.0 / d).collect();
             let moment = |sets: PeriodicSets| sets.density() * sets.moment(3) / 12.0;
@@ -181,4 +153,4 @@ impl FlatRig<'_> {
 ///
 /// For w >= 1/2 the mean over e_1 and e_2 is (3 w^2 + (1 - w)^2) / (6 w). The share of E_T that the error
 /// of linear interpolation has on average.
-pub const UNIFORM_ERROR_SHARE: f64 = (0.5 + std::f64::consts::LN_2) / 3.0;
+pub(crate) const UNIFORM_ERROR_SHARE: f64 = (0.5 + std::f64::consts::LN_2) / 3.0;

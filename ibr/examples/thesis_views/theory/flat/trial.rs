@@ -2,68 +2,25 @@
 //! compared with the exact one.
 
 use super::{Errors, FlatCamera, FlatRig, parameter_at};
-use crate::theory::piecewise_linear::PiecewiseLinear;
+use crate::theory::piecewise_linear::{Knot, PiecewiseLinear};
 use crate::theory::random::{part, seeded};
-use hybank_sampling::nonuniform::Measured;
 use rand_pcg::Pcg64;
 
 /// Positions at which a view is compared.
 const POSITIONS: usize = 3000;
 
-/// A sample of the virtual image and what it came from.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Propagated {
-    /// Position in the virtual image.
-    x: f64,
-    depth: f64,
-    value: f64,
-}
-
 /// The mean absolute error of one view with image-space interpolation: propagated samples joined by lines.
 /// Phases and errors are drawn from the seed; errors are uniform within their bounds. `None` if no sample
 /// falls on the curve.
-pub fn image_space(rig: &FlatRig<'_>, errors: Errors, seed: u64) -> Option<f64> {
+pub(crate) fn image_space(rig: &FlatRig<'_>, errors: Errors, seed: u64) -> Option<f64> {
     let random = &mut seeded(seed);
     let phases: Vec<f64> = rig.cameras.iter().map(|_| part(random)).collect();
-    let samples = capture(rig, &phases, errors, random);
-    let jitter = errors.depth * rig.jitter_factor(errors.depth);
-    let measured = |s: &Propagated| Measured { x: s.x, value: s.value, error: errors.texture, jitter };
-    let line = PiecewiseLinear::new(samples.iter().map(measured).collect()).ok()?;
+    let line = PiecewiseLinear::new(capture(rig, &phases, errors, random))?;
     Some(mean_error(rig, |x| line.value(x)))
 }
 
-/// The same with given phases of the cameras' pixels and no errors, with the sure bound of the samples at
-/// hand beside it: (1/12) sup|f_v''| sum D^3 / sum D.
-pub fn with_phases(rig: &FlatRig<'_>, phases: &[f64]) -> Option<(f64, f64)> {
-    let samples = capture(rig, phases, Errors::default(), &mut seeded(0));
-    let measured = |s: &Propagated| Measured { x: s.x, value: s.value, error: 0.0, jitter: 0.0 };
-    let line = PiecewiseLinear::new(samples.iter().map(measured).collect()).ok()?;
-    let limits = rig.smoothness();
-    Some((mean_error(rig, |x| line.value(x)), line.mean_error_bound(limits)?))
-}
-
-/// The mean absolute error of one view with object-space interpolation: reconstructed points joined by
-/// chords, on which intensity is linear.
-pub fn object_space(rig: &FlatRig<'_>, errors: Errors, seed: u64) -> Option<f64> {
-    let random = &mut seeded(seed);
-    let phases: Vec<f64> = rig.cameras.iter().map(|_| part(random)).collect();
-    let mut samples = capture(rig, &phases, errors, random);
-    samples.sort_by(|a, b| a.x.total_cmp(&b.x));
-    (samples.len() > 1).then(|| mean_error(rig, |x| on_chord(&samples, x)))
-}
-
-/// The intensity where the ray of pixel x meets its chord. With a = x_m d_m the chord projects to
-/// ((1 - s) a_1 + s a_2) / ((1 - s) d_1 + s d_2), which is x at s = r_1 / (r_1 - r_2), r = a - x d.
-fn on_chord(samples: &[Propagated], x: f64) -> f64 {
-    let right = samples.partition_point(|s| s.x < x).clamp(1, samples.len() - 1);
-    let (a, b) = (&samples[right - 1], &samples[right]);
-    let residual = |p: &Propagated| (p.x - x) * p.depth;
-    let span = residual(a) - residual(b);
-    if span == 0.0 { a.value } else { a.value + (b.value - a.value) * residual(a) / span }
-}
-
 /// The samples of all cameras in the virtual image: pixel n of camera i lies at n + phases\[i\].
-fn capture(rig: &FlatRig<'_>, phases: &[f64], errors: Errors, random: &mut Pcg64) -> Vec<Propagated> {
+fn capture(rig: &FlatRig<'_>, phases: &[f64], errors: Errors, random: &mut Pcg64) -> Vec<Knot> {
     let mut samples = Vec::new();
     for (camera, phase) in rig.cameras.iter().zip(phases) {
         for pixel in pixels(rig, camera, *phase) {
@@ -71,8 +28,8 @@ fn capture(rig: &FlatRig<'_>, phases: &[f64], errors: Errors, random: &mut Pcg64
             let c = rig.scene.at(u);
             let mut error = |limit: f64| limit * (2.0 * part(random) - 1.0);
             let depth = camera.project(&c.point).1 + error(errors.depth);
-            let (x, depth) = rig.view.project(&camera.unproject(pixel, depth));
-            samples.push(Propagated { x, depth, value: c.texture[0] + error(errors.texture) });
+            let (x, _) = rig.view.project(&camera.unproject(pixel, depth));
+            samples.push(Knot { x, value: c.texture[0] + error(errors.texture) });
         }
     }
     samples

@@ -3,31 +3,29 @@
 //! A surface S(u, v) carries the texture T(u, v); every camera sees all of the part that is judged. The
 //! propagated samples are triangulated (Delaunay), and intensity is linear on the triangles.
 
-pub mod scenes;
-#[cfg(test)]
-mod tests;
+pub(crate) mod scenes;
 mod theorem;
-pub mod trial;
-pub mod triangles;
+pub(crate) mod trial;
+pub(crate) mod triangles;
 
-pub use theorem::{EdgeModel, SpatialRig};
+pub(crate) use theorem::SpatialRig;
 
 use hybank_ibr::camera::Camera;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 /// A point of a painted surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SurfacePoint {
+pub(crate) struct SurfacePoint {
     /// S(u, v).
-    pub point: Vector3<f64>,
+    pub(crate) point: Vector3<f64>,
     /// S_u and S_v.
-    pub tangents: [Vector3<f64>; 2],
+    pub(crate) tangents: [Vector3<f64>; 2],
     /// T(u, v).
-    pub texture: f64,
+    pub(crate) texture: f64,
 }
 
 /// A surface with a texture.
-pub trait PaintedSurface: Sync {
+pub(crate) trait PaintedSurface: Sync {
     /// The point of the parameters (u, v).
     fn at(&self, parameters: Vector2<f64>) -> SurfacePoint;
 }
@@ -63,43 +61,4 @@ pub(crate) fn parameters_at(
         }
     }
     None
-}
-
-#[cfg(test)]
-mod shape {
-    use super::scenes::Hill;
-    use super::*;
-    use nalgebra::{Matrix3, Matrix3x4, Rotation3};
-
-    fn camera() -> Camera {
-        let k = Matrix3::new(300.0, 1.0, 10.0, 0.0, 310.0, 20.0, 0.0, 0.0, 1.0);
-        let r = Rotation3::from_euler_angles(0.1, -0.2, 0.4);
-        let mut rt = Matrix3x4::zeros();
-        rt.fixed_columns_mut::<3>(0).copy_from(r.matrix());
-        rt.set_column(3, &Vector3::new(0.2, -0.1, 0.3));
-        Camera::metric(k * rt, false).unwrap()
-    }
-
-    #[test]
-    fn the_jacobian_is_a_volume_and_a_derivative() {
-        let (at, h) = (Vector2::new(0.4, -0.3), 1e-5);
-        let s = Hill.at(at);
-        let (_, d, j) = see(&camera(), &s);
-        let volume = (s.point - camera().centre()).dot(&s.tangents[0].cross(&s.tangents[1]));
-        let want = (camera().determinant() * volume / d.powi(3)).abs();
-        assert!((j.determinant().abs() / want - 1.0).abs() < 1e-10);
-        let pixel = |at: Vector2<f64>| see(&camera(), &Hill.at(at)).0;
-        for (k, e) in [Vector2::x(), Vector2::y()].into_iter().enumerate() {
-            let slope = (pixel(at + e * h) - pixel(at - e * h)) / (2.0 * h);
-            assert!((slope - j.column(k)).norm() < 1e-5 * slope.norm());
-        }
-    }
-
-    #[test]
-    fn pixels_are_found_on_the_surface() {
-        let at = Vector2::new(0.4, -0.3);
-        let pixel = see(&camera(), &Hill.at(at)).0;
-        let found = parameters_at(&Hill, &camera(), pixel, Vector2::zeros()).unwrap();
-        assert!((found - at).norm() < 1e-9);
-    }
 }

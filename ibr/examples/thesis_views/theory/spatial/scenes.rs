@@ -6,7 +6,7 @@ use nalgebra::{Matrix3x4, Vector2, Vector3};
 
 /// A hill: S = (u, v, 6 + 0.3 cos 1.3u cos 1.1v), T = 0.5 + 0.25 sin(4u + 1) cos 3v + 0.15 sin(2u - 5v).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Hill;
+pub(crate) struct Hill;
 
 impl PaintedSurface for Hill {
     fn at(&self, p: Vector2<f64>) -> SurfacePoint {
@@ -25,7 +25,7 @@ impl PaintedSurface for Hill {
 ///
 /// # Errors
 /// [`CameraError`] for numbers that are not finite or a focal length of 0.
-pub fn camera_at(x: f64, y: f64, focal: f64) -> Result<Camera, CameraError> {
+pub(crate) fn camera_at(x: f64, y: f64, focal: f64) -> Result<Camera, CameraError> {
     let f = focal;
     Camera::metric(Matrix3x4::new(f, 0.0, 0.0, -f * x, 0.0, f, 0.0, -f * y, 0.0, 0.0, 1.0, 0.0), false)
 }

@@ -15,15 +15,15 @@ const STEP: f64 = 0.02;
 
 /// A scene, the cameras that see it, and the virtual camera.
 #[derive(Clone, Copy)]
-pub struct SpatialRig<'a> {
+pub(crate) struct SpatialRig<'a> {
     /// The surface.
-    pub scene: &'a dyn PaintedSurface,
+    pub(crate) scene: &'a dyn PaintedSurface,
     /// The actual cameras.
-    pub cameras: &'a [Camera],
+    pub(crate) cameras: &'a [Camera],
     /// The virtual camera.
-    pub view: &'a Camera,
+    pub(crate) view: &'a Camera,
     /// The part of the virtual image that is judged: its two corners, in pixels.
-    pub window: (Vector2<f64>, Vector2<f64>),
+    pub(crate) window: (Vector2<f64>, Vector2<f64>),
 }
 
 impl SpatialRig<'_> {
@@ -33,12 +33,12 @@ impl SpatialRig<'_> {
     }
 
     /// f_v at a pixel.
-    pub fn intensity(&self, pixel: Vector2<f64>) -> f64 {
+    pub(crate) fn intensity(&self, pixel: Vector2<f64>) -> f64 {
         self.scene.at(self.parameters(pixel)).texture
     }
 
     /// Samples of each camera per square pixel of the virtual view: |det J_i| / |det J_v|.
-    pub fn densities(&self, pixel: Vector2<f64>) -> Vec<f64> {
+    pub(crate) fn densities(&self, pixel: Vector2<f64>) -> Vec<f64> {
         let s = self.scene.at(self.parameters(pixel));
         let area = |camera: &Camera| see(camera, &s).2.determinant().abs();
         let stretch = area(self.view);
@@ -51,7 +51,7 @@ impl SpatialRig<'_> {
     /// ```text
     /// |delta| |(S - C_i) x (S - C_v)| / (d_i d_v d^_v)
     /// ```
-    pub fn jitter(&self, camera: usize, pixel: Vector2<f64>, delta: f64) -> Vector2<f64> {
+    pub(crate) fn jitter(&self, camera: usize, pixel: Vector2<f64>, delta: f64) -> Vector2<f64> {
         let s = self.scene.at(self.parameters(pixel)).point;
         let (x, y, d) = self.cameras[camera].project(&s);
         let (u, v, _) = self.view.project(&self.cameras[camera].unproject(x, y, d + delta));
@@ -65,7 +65,7 @@ impl SpatialRig<'_> {
     }
 
     /// B_v: the largest jitter per unit of depth error, for errors up to `depth_error`.
-    pub fn jitter_factor(&self, depth_error: f64) -> f64 {
+    pub(crate) fn jitter_factor(&self, depth_error: f64) -> f64 {
         let delta = depth_error.max(1e-9);
         let worst = |i: usize, pixel| {
             [delta, -delta].map(|d| self.jitter(i, pixel, d).norm()).into_iter().fold(0.0, f64::max)
@@ -75,7 +75,7 @@ impl SpatialRig<'_> {
     }
 
     /// Suprema of the gradient and the Hessian of the virtual image, by differences.
-    pub fn smoothness(&self) -> PlaneSmoothness {
+    pub(crate) fn smoothness(&self) -> PlaneSmoothness {
         let mut limits = PlaneSmoothness { slope: 0.0, curvature: 0.0 };
         for pixel in self.grid(NODES) {
             let (gradient, hessian) = self.derivatives(pixel);
@@ -87,7 +87,7 @@ impl SpatialRig<'_> {
     }
 
     /// Gradient and Hessian of f_v at a pixel.
-    pub fn derivatives(&self, pixel: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
+    pub(crate) fn derivatives(&self, pixel: Vector2<f64>) -> (Vector2<f64>, Matrix2<f64>) {
         let f = |dx: f64, dy: f64| self.intensity(pixel + Vector2::new(dx, dy) * STEP);
         let here = f(0.0, 0.0);
         let (left, right, up, down) = (f(-1.0, 0.0), f(1.0, 0.0), f(0.0, -1.0), f(0.0, 1.0));
@@ -104,7 +104,7 @@ impl SpatialRig<'_> {
     /// ```
     ///
     /// half the mean squared circumradius over the window, times K. An expectation, as Theorem 3.1 is.
-    pub fn bound(&self, errors: Errors) -> ErrorBound {
+    pub(crate) fn bound(&self, errors: Errors) -> ErrorBound {
         let PlaneSmoothness { slope, curvature } = self.smoothness();
         ErrorBound {
             sampling: curvature / 2.0 * self.mean(|p| p.mean_squared_radius()),
@@ -123,7 +123,7 @@ impl SpatialRig<'_> {
     /// The error is half the trace of the Hessian times M = sum b_k (p_k - x)(p_k - x)', which is positive
     /// semidefinite: for |d| <= |m| its mean is that of |m|, and for a saddle, m = 0, the share
     /// E|M11 - M22| / E(M11 + M22) = 0.424 of it. The cubes join the two within 3 %.
-    pub fn estimate(&self) -> f64 {
+    pub(crate) fn estimate(&self) -> f64 {
         let local = |pixel: Vector2<f64>| {
             let hessian = self.derivatives(pixel).1;
             let (m, d) = principal(&hessian);
@@ -148,26 +148,4 @@ const SADDLE: f64 = 0.424;
 fn principal(matrix: &Matrix2<f64>) -> (f64, f64) {
     let half = (matrix[(0, 0)] - matrix[(1, 1)]) / 2.0;
     (matrix.trace() / 2.0, half.hypot(matrix[(0, 1)]))
-}
-
-/// Expected mean absolute error of a view with edges between surfaces, by parts that add up.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EdgeModel {
-    /// Length of the edges in the view, in pixels.
-    pub length: f64,
-    /// Mean height |J| of the jump across them.
-    pub height: f64,
-    /// Area of the view, in square pixels.
-    pub area: f64,
-    /// Samples per square pixel.
-    pub density: f64,
-}
-
-impl EdgeModel {
-    /// 0.4323 |J| (length / area) lambda^(-1/2): the error beside the edges. It decays with the root of the
-    /// number of pixels, so in scenes with occlusion it decides in the end.
-    pub fn error(&self) -> f64 {
-        let per_length = PoissonDelaunay { density: self.density }.edge_error();
-        self.height * self.length / self.area * per_length
-    }
 }

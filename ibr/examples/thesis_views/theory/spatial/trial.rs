@@ -18,22 +18,11 @@ const MARGIN: f64 = 0.15;
 /// The mean absolute error of one view by linear interpolation on Delaunay triangles. Phases and errors are
 /// drawn from the seed; errors are uniform within their bounds. `None` if the samples do not cover the
 /// window.
-pub fn image_space(rig: &SpatialRig<'_>, errors: Errors, seed: u64) -> Option<f64> {
+pub(crate) fn image_space(rig: &SpatialRig<'_>, errors: Errors, seed: u64) -> Option<f64> {
     let random = &mut seeded(seed);
     let phases: Vec<Vector2<f64>> =
         rig.cameras.iter().map(|_| Vector2::new(part(random), part(random))).collect();
     mean_error(&Triangles::new(capture(rig, errors, &phases, random))?, rig)
-}
-
-/// The same with given phases of the cameras' pixels and no errors, with the sure bound of the triangles at
-/// hand beside it: the mean of (1/2) K sum b_k |p_k - x|^2.
-pub fn with_phases(rig: &SpatialRig<'_>, phases: &[Vector2<f64>]) -> Option<(f64, f64)> {
-    let mesh = Triangles::new(capture(rig, Errors::default(), phases, &mut seeded(0)))?;
-    let (limits, mut sure) = (rig.smoothness(), 0.0);
-    for pixel in rig.grid(SIDE) {
-        sure += mesh.around(pixel)?.error_bound(pixel, limits, 0.0, 0.0);
-    }
-    Some((mean_error(&mesh, rig)?, sure / (SIDE * SIDE) as f64))
 }
 
 /// The samples of all cameras in the virtual image, with their values.

@@ -1,0 +1,6 @@
+//! Streams through the public interface.
+
+mod allocations;
+mod in_place;
+mod small_calls;
+mod states;
