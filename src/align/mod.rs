@@ -5,6 +5,7 @@
 //! gains and offsets. A smoothing spline goes through the delays, as through any readings that are known
 //! beforehand.
 
+mod clock;
 mod coincidence;
 mod course;
 mod error;
@@ -12,8 +13,8 @@ mod pieces;
 mod reading;
 #[cfg(test)]
 mod tests;
-mod timeline;
 
+pub use clock::{ClockCourse, Step};
 pub use error::{AlignError, AlignWarning};
 pub use reading::Reading;
 
@@ -59,7 +60,7 @@ pub struct AlignSettings {
 }
 
 /// How recordings lie in time.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Alignment {
     /// The reference channel, from 0.
     pub reference: usize,
@@ -78,6 +79,23 @@ pub struct Alignment {
     pub spec: Spec,
     /// What a reader of the values must know.
     pub warnings: Vec<AlignWarning>,
+    clocks: Vec<ClockCourse>,
+}
+
+impl Alignment {
+    /// When the samples of the recording of a channel, from 0, were taken. The reference has its own time.
+    ///
+    /// ```text
+    /// let clock = alignment.instants(1);
+    /// clock.at(480.0)             // instant of sample 480, in samples of the reference
+    /// clock.deviation(480.0)      // its standard deviation
+    /// ```
+    ///
+    /// # Panics
+    /// If there is no such channel.
+    pub fn instants(&self, channel: usize) -> &ClockCourse {
+        &self.clocks[channel]
+    }
 }
 
 /// How the recording of one channel lies in time.
@@ -128,7 +146,7 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
     let estimates = Pieces::new(spec, records, fit, &stretches).measure(&lines)?;
     let few = AlignError::NotMeasured { measured: estimates.len(), pieces, reason: None };
     let course = Course::new(spec, settings, &estimates, &stretches).ok_or(few)?;
-    Ok(alignment(spec, records, &course, &estimates, pieces))
+    Ok(alignment(spec, records, course, &estimates, pieces))
 }
 
 /// Refuses recordings that have too few samples in common.
@@ -177,7 +195,7 @@ impl Stretches {
 fn alignment(
     spec: &Spec,
     records: &[Record],
-    course: &Course<'_>,
+    course: Course<'_>,
     estimates: &[PieceEstimate],
     pieces: usize,
 ) -> Alignment {
@@ -216,5 +234,6 @@ fn alignment(
             .extend(met.map(|(pair, at)| AlignWarning::Coincidence { channels: pair.map(|i| i + 1), at }));
     }
     let readings = course.readings(&skips, raised);
-    Alignment { reference, channels, frames, pieces, measured, readings, spec, warnings }
+    let clocks = course.into_clocks();
+    Alignment { reference, channels, frames, pieces, measured, readings, spec, warnings, clocks }
 }

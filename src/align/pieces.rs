@@ -10,11 +10,16 @@ use crate::calibrate::{
     longest_run, steadied, stretch,
 };
 use crate::linalg::fourier;
+use crate::sine_fit::Estimate;
 use crate::spec::Spec;
+use crate::units::FastPeriods;
 
 /// A measurement with a larger standard deviation says nothing, in fast periods: its interval is as wide as
 /// the distance of two channels.
 const LARGEST_DEVIATION: f64 = 0.25;
+/// Least standard deviation of a lag in samples: what a drift within a piece and the rounding of the fit may
+/// do.
+const LEAST_DEVIATION: f64 = 1e-6;
 /// Pieces on each side whose lags say where that of a piece is to be.
 const BESIDE: usize = 7;
 /// Samples by which the lag of a piece may differ from what the pieces beside it say.
@@ -42,8 +47,11 @@ pub(super) struct Pieces<'a> {
 pub(super) struct PieceEstimate {
     /// Sample of the reference at its middle.
     pub(super) centre: f64,
-    /// One per channel; D_i of samples that count from that of the reference.
+    /// One per channel: gains and offsets.
     pub(super) channels: Vec<ChannelEstimate>,
+    /// One per channel: a sample of it, and by how much that is larger than its instant in samples of the
+    /// reference.
+    pub(super) lags: Vec<Option<(f64, Estimate<f64>)>>,
 }
 
 /// What the correlation in one piece says of the lag of a recording.
@@ -166,18 +174,31 @@ impl<'a> Pieces<'a> {
         let (begin, frames) = longest_run(&parts);
         let parts: Vec<Record> = parts.iter().map(|part| part.part(begin..begin + frames)).collect();
         let found = calibrate(&spec, &parts, &CalibrationSignal::Any, self.settings)?;
-        let centre = (first + begin) as f64 + 0.5 * (frames as f64 - 1.0);
-        let mut channels = found.channels;
-        for (i, channel) in channels.iter_mut().enumerate() {
-            let Some(delay) = channel.delay.as_mut() else { continue };
+        // Steadied recordings agree with their own clocks in the middle of the piece.
+        let middle = 0.5 * (length as f64 - 1.0);
+        let beside = begin as f64 + 0.5 * (frames as f64 - 1.0) - middle;
+        let centre = first as f64 + middle + beside;
+        let mut all = Vec::new();
+        for (i, channel) in found.channels.iter().enumerate() {
+            let Some(delay) = channel.delay else {
+                all.push(None);
+                continue;
+            };
             let moved = (delay.value - spec.channels[i].delay.in_fast_periods(h)).0.abs();
             let is_known = delay.sigma.0 <= LARGEST_DEVIATION && moved <= FARTHEST * spec.ratio as f64;
             if !is_known {
                 return Ok(None);
             }
-            delay.value += (slow * shifts[i]).in_fast_periods(h);
+            let in_samples = |periods: FastPeriods| periods.0 / spec.ratio as f64;
+            let later = in_samples(delay.value - own.in_fast_periods(h));
+            let sample = first as f64 + shifts[i] + middle + (1.0 + self.rates[i]) * beside;
+            let lag = Estimate {
+                value: sample - centre + later,
+                sigma: in_samples(delay.sigma).max(LEAST_DEVIATION),
+            };
+            all.push(Some((sample, lag)));
         }
-        Ok(Some(PieceEstimate { centre, channels }))
+        Ok(Some(PieceEstimate { centre, channels: found.channels, lags: all }))
     }
 }
 

@@ -1,0 +1,268 @@
+//! When the samples of a recording were taken, on the clock of the reference.
+
+use crate::sampling::SmoothingSpline;
+use crate::sampling::nonuniform::Measured;
+use crate::sine_fit::Estimate;
+use std::ops::Range;
+
+/// Readings beyond this many standard deviations of what the others say are refused.
+const GATE_SIGMAS: f64 = 5.0;
+/// Rounds in which readings are refused, those that contradict the others most in each.
+const ROUNDS: usize = 12;
+/// Readings on each side of the worst one that are judged again without it.
+const BESIDE: usize = 4;
+
+/// Median of the absolute values of a normal law, in its deviations.
+const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
+/// Misfits on each side that say how far a reading scatters: sounds change after some pieces.
+const WIDENED_BY: usize = 6;
+/// A misfit counts as at most so many of the usual ones: a reading may be wrong altogether, and is refused
+/// later.
+const MOST_MISFIT: f64 = 3.0;
+/// Rounds in which the sample of an instant is found.
+const INVERSE_ROUNDS: usize = 5;
+
+/// What one piece says of a clock. Samples are those of the recording with its steps mended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ClockReading {
+    /// Number of the piece.
+    pub(super) piece: usize,
+    /// Sample of the recording.
+    pub(super) sample: f64,
+    /// The sample minus its instant, in samples of the reference.
+    pub(super) lag: f64,
+    /// Standard deviation of the lag.
+    pub(super) deviation: f64,
+}
+
+/// A place where a recording lacks samples, or has some that the reference has not.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Step {
+    /// Samples of the recording, as given, among which it lies: what they hold belongs to neither side.
+    pub samples: Range<usize>,
+    /// Samples that are lost; below 0 those that are too many.
+    pub lost: i64,
+}
+
+/// When the samples of a recording were taken: a smooth course with steps where samples were lost.
+///
+/// Samples count from the first one of the recording as it was given, instants in samples of the recording
+/// of the reference, from its first one. Both may be fractions, and beyond the readings the course goes on
+/// as a line.
+#[derive(Debug, Clone)]
+pub struct ClockCourse {
+    /// Of the lag over the samples with the steps mended. None for the reference.
+    spline: Option<SmoothingSpline>,
+    /// By their samples.
+    steps: Vec<Step>,
+    /// Those that were not refused, by their pieces.
+    readings: Vec<ClockReading>,
+}
+
+impl ClockCourse {
+    /// Of the reference itself.
+    pub(super) fn reference() -> Self {
+        Self { spline: None, steps: Vec::new(), readings: Vec::new() }
+    }
+
+    /// Through readings. `None` if no spline goes through them, and with those of fewer than two samples.
+    pub(super) fn new(mut readings: Vec<ClockReading>, rate_walk: f64) -> Option<Self> {
+        let has_two_samples = readings.iter().any(|reading| reading.sample != readings[0].sample);
+        if !has_two_samples {
+            return None;
+        }
+        for _ in 0..ROUNDS {
+            let spline = spline(&readings, rate_walk)?;
+            let worst = contradictory(&spline);
+            // Without two samples nothing is left to be judged by.
+            if worst.is_empty() || readings.len() < worst.len() + 2 {
+                return Some(Self { spline: Some(spline), steps: Vec::new(), readings });
+            }
+            for k in worst.into_iter().rev() {
+                readings.remove(k);
+            }
+        }
+        Some(Self { spline: Some(spline(&readings, rate_walk)?), steps: Vec::new(), readings })
+    }
+
+    /// The instant of a sample, in samples of the reference.
+    pub fn at(&self, sample: f64) -> f64 {
+        let mended = self.mended(sample);
+        mended - self.known(mended).value
+    }
+
+    /// Standard deviation of the instant of a sample, in samples of the reference.
+    pub fn deviation(&self, sample: f64) -> f64 {
+        self.known(self.mended(sample)).sigma
+    }
+
+    /// Where samples were lost or came in.
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// The number of a sample had none been lost before it.
+    fn mended(&self, sample: f64) -> f64 {
+        let before = self.steps.iter().take_while(|step| step.samples.end as f64 <= sample);
+        sample + before.map(|step| step.lost as f64).sum::<f64>()
+    }
+
+    /// By how much a sample of the mended recording is larger than its instant.
+    pub(super) fn known(&self, mended: f64) -> Estimate<f64> {
+        let Some(spline) = &self.spline else { return Estimate { value: 0.0, sigma: 0.0 } };
+        let known = spline.at(mended);
+        Estimate { value: known.value, sigma: known.variance.sqrt() }
+    }
+
+    /// The sample of the mended recording that was taken at an instant.
+    pub(super) fn sample_at(&self, instant: f64) -> f64 {
+        // Clocks differ so little that each round gains three digits.
+        (0..INVERSE_ROUNDS).fold(instant, |sample, _| instant + self.known(sample).value)
+    }
+
+    /// By how much the clock is fast: the slope of the line that is closest to the lags. Their first and
+    /// last ones alone would say it with the errors of few pieces. The deviation is that of the scatter
+    /// around the line.
+    pub(super) fn drift(&self) -> Estimate<f64> {
+        let weight = |reading: &ClockReading| reading.deviation.powi(-2);
+        let sum = |of: &dyn Fn(&ClockReading) -> f64| -> f64 {
+            self.readings.iter().map(|reading| weight(reading) * of(reading)).sum()
+        };
+        let weights = sum(&|_| 1.0);
+        let (middle, mean) = (sum(&|one| one.sample) / weights, sum(&|one| one.lag) / weights);
+        let squares = sum(&|one| (one.sample - middle).powi(2));
+        let slope = sum(&|one| (one.sample - middle) * (one.lag - mean)) / squares;
+        let misfit = sum(&|one| (one.lag - mean - slope * (one.sample - middle)).powi(2));
+        let freedom = self.readings.len().saturating_sub(2).max(1) as f64;
+        // From samples of the recording to those of the reference.
+        Estimate { value: slope / (1.0 - slope), sigma: (misfit / freedom).max(1.0).sqrt() / squares.sqrt() }
+    }
+
+    /// The reading of a piece, unless it has none or that was refused.
+    pub(super) fn reading(&self, piece: usize) -> Option<&ClockReading> {
+        self.readings.binary_search_by_key(&piece, |reading| reading.piece).ok().map(|k| &self.readings[k])
+    }
+}
+
+fn spline(readings: &[ClockReading], rate_walk: f64) -> Option<SmoothingSpline> {
+    let measured = |reading: &ClockReading| Measured {
+        x: reading.sample,
+        value: reading.lag,
+        error: reading.deviation,
+        jitter: 0.0,
+    };
+    SmoothingSpline::new(readings.iter().map(measured).collect(), rate_walk).ok()
+}
+
+/// The samples that contradict the others, each the worst of those beside it.
+fn contradictory(spline: &SmoothingSpline) -> Vec<usize> {
+    let found: Vec<f64> = spline.contradictions().collect();
+    let is_worst = |k: &usize| {
+        let beside = k.saturating_sub(BESIDE)..(k + BESIDE + 1).min(found.len());
+        found[*k] > GATE_SIGMAS && beside.into_iter().all(|j| j == *k || found[j] < found[*k])
+    };
+    (0..found.len()).filter(is_worst).collect()
+}
+
+/// Widens the intervals to what the readings beside each scatter. Intervals of pieces are
+/// those of the Cramer-Rao bound, which pieces of little or narrow sound miss by up to twice, while the
+/// others reach it.
+///
+/// Misfits are second differences in their stated deviations; overlapping ones are correlated by -2/3 and
+/// 1/6. The variance of a reading relative to the stated one has the scaled inverse chi-square law whose
+/// prior, of two degrees of freedom, is the stated variance, and whose data are the misfits: its mean is
+/// theirs plus 2 over their degrees of freedom.
+pub(super) fn widen(readings: &mut [ClockReading]) {
+    let misfit = |three: &[ClockReading]| {
+        let [before, own, after] = [three[0], three[1], three[2]];
+        let share = (own.sample - before.sample) / (after.sample - before.sample);
+        let miss = own.lag - (1.0 - share) * before.lag - share * after.lag;
+        let deviation = own.deviation.hypot((1.0 - share) * before.deviation);
+        miss.abs() / deviation.hypot(share * after.deviation)
+    };
+    let misfits: Vec<f64> = readings.windows(3).map(misfit).collect();
+    let mut sorted = misfits.clone();
+    sorted.sort_by(f64::total_cmp);
+    let Some(median) = sorted.get(sorted.len() / 2) else { return };
+    let most = MOST_MISFIT * (median / MEDIAN_OF_NORMAL).max(1.0);
+    let factor = |number: usize| {
+        // The misfit of a reading is one before it, because the first reading has none.
+        let beside = number.saturating_sub(WIDENED_BY + 1)..(number + WIDENED_BY).min(misfits.len());
+        let freedom = beside.len() as f64 / (1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0));
+        let squares: f64 = misfits[beside.clone()].iter().map(|misfit| misfit.min(most).powi(2)).sum();
+        (squares / beside.len() as f64 + 2.0 / freedom).max(1.0).sqrt()
+    };
+    readings.iter_mut().enumerate().for_each(|(number, reading)| reading.deviation *= factor(number));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    /// Readings every `step` samples of a lag.
+    fn readings(count: usize, step: usize, deviation: f64, lag: impl Fn(f64) -> f64) -> Vec<ClockReading> {
+        let mut random = Random(21);
+        let mut normal = || (0..12).map(|_| random.part()).sum::<f64>() - 6.0;
+        let reading = |piece| {
+            let sample = (piece * step) as f64;
+            ClockReading { piece, sample, lag: lag(sample) + deviation * normal(), deviation }
+        };
+        (0..count).map(reading).collect()
+    }
+
+    const RATE_WALK: f64 = 1e-15;
+
+    /// A rate that changes by 2 ppm in a thousand samples: the lags err as the course states.
+    #[test]
+    fn the_stated_error_is_that_of_the_lags() {
+        let lag = |k: f64| 10.0 + 3e-6 * k + 5e-4 * (2e-3 * k).sin();
+        let all = readings(400, 20, 2e-5, lag);
+        let course = ClockCourse::new(all.clone(), RATE_WALK).unwrap();
+        let (mut smoothed, mut stated) = (0.0, 0.0);
+        for reading in &all[60..340] {
+            let k = reading.sample;
+            smoothed += (course.at(k) - k + lag(k)).powi(2);
+            stated += course.deviation(k).powi(2);
+        }
+        let ratio = f64::sqrt(smoothed / stated);
+        assert!((0.6..1.5).contains(&ratio) && smoothed < 280.0 * 0.25 * 4e-10, "{ratio} {smoothed:e}");
+    }
+
+    #[test]
+    fn false_readings_are_refused() {
+        let mut all = readings(200, 20, 2e-5, |k| 10.0 + 3e-6 * k);
+        for k in [3, 77, 78, 150] {
+            all[k].lag += 1e-3;
+        }
+        let course = ClockCourse::new(all, RATE_WALK).unwrap();
+        let refused: Vec<usize> = (0..200).filter(|piece| course.reading(*piece).is_none()).collect();
+        assert_eq!(refused, [3, 77, 78, 150]);
+        let miss = course.at(1550.0) - (1540.0 - 3e-6 * 1550.0);
+        assert!(miss.abs() < 4.0 * course.deviation(1550.0), "{miss:e}");
+    }
+
+    #[test]
+    fn one_reading_has_no_course() {
+        let all = readings(5, 20, 1e-8, |k| k);
+        assert!(ClockCourse::new(all[..1].to_vec(), RATE_WALK).is_none());
+    }
+
+    /// Nor has a reading whose interval is no number.
+    #[test]
+    fn readings_without_numbers_have_no_course() {
+        let mut all = readings(5, 20, 1e-8, |k| k);
+        all[2].deviation = f64::NAN;
+        assert!(ClockCourse::new(all, RATE_WALK).is_none());
+    }
+
+    #[test]
+    fn lost_samples_are_steps_of_the_course() {
+        let mut course = ClockCourse::new(readings(5, 20, 1e-8, |_| 10.0), RATE_WALK).unwrap();
+        course.steps = vec![Step { samples: 30..32, lost: 7 }, Step { samples: 60..60, lost: -2 }];
+        let instants = [29.0, 31.0, 32.0, 59.5, 60.0, 61.0].map(|k| course.at(k));
+        let want = [19.0, 21.0, 29.0, 56.5, 55.0, 56.0];
+        assert!(instants.iter().zip(&want).all(|(a, b)| (a - b).abs() < 1e-6), "{instants:?}");
+        assert_eq!(ClockCourse::reference().at(3.25), 3.25);
+    }
+}
