@@ -8,7 +8,7 @@ use super::capture_file::{start, unread};
 use super::file_kind::FileKind;
 use super::print::{Failure, check_json, failed, failed_at, is_dash, say_understood, show, warn};
 use super::written::{Mono, begin_file, begin_recording, check_outputs, write_text, write_together};
-use hybank::align::{AlignError, AlignSettings, AlignedChannel, Alignment, RATE_WALK, align};
+use hybank::align::{AlignError, AlignSettings, AlignedChannel, Alignment, align};
 use hybank::calibrate::{CalibrateError, Record};
 use hybank::captures::Captures;
 use hybank::figures::Alone;
@@ -165,7 +165,7 @@ impl Args {
         if within.is_some_and(|time| time < Seconds(0.0)) {
             return Err(Failure::Usage("--within: a time is not negative".into()));
         }
-        Ok(AlignSettings { reference: reference(self.reference, spec)?, within, rate_walk: unit * RATE_WALK })
+        Ok(AlignSettings { reference: reference(self.reference, spec)?, within })
     }
 
     /// Writes all outputs, which appear together; `others` are those beside the spec.

@@ -31,7 +31,6 @@ pub(crate) fn align<'py>(
     let settings = AlignSettings {
         reference: reference_of(&spec, reference)?,
         within: within.map(Seconds),
-        rate_walk: alignment::RATE_WALK,
     };
     let found = background::run(py, None, move |_| {
         let found = alignment::align(&spec, &all, settings).map_err(|error| error.to_string())?;

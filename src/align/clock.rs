@@ -1,7 +1,8 @@
 //! When the samples of a recording were taken, on the clock of the reference.
 
-use crate::sampling::SmoothingSpline;
+use super::path::median;
 use crate::sampling::nonuniform::Measured;
+use crate::sampling::{LeftOut, SmoothingSpline};
 use crate::sine_fit::Estimate;
 use std::ops::Range;
 
@@ -15,7 +16,12 @@ const BESIDE: usize = 4;
 /// Median of the absolute values of a normal law, in its deviations.
 const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 /// Misfits on each side that say how far a reading scatters: sounds change after some pieces.
-const WIDENED_BY: usize = 6;
+const WEIGHED_BY: usize = 6;
+/// Readings without any noise scatter by this share of their deviations.
+const LEAST_SCALE: f64 = 1e-3;
+/// Powers of ten of the variance by which a rate may walk per sample. That of 1 ppm in a second is 2e-17 at
+/// 48 kHz.
+const WALKS: std::ops::RangeInclusive<i32> = -26..=-9;
 /// A misfit counts as at most so many of the usual ones: a reading may be wrong altogether, and is refused
 /// later.
 const MOST_MISFIT: f64 = 3.0;
@@ -51,8 +57,8 @@ pub struct Step {
 /// as a line.
 #[derive(Debug, Clone)]
 pub struct ClockCourse {
-    /// Of the lag over the samples with the steps mended. None for the reference.
-    spline: Option<SmoothingSpline>,
+    /// The lag over the samples with the steps mended. None for the reference.
+    smooth: Option<Smooth>,
     /// By their samples.
     steps: Vec<Step>,
     /// Those that were not refused, by their pieces.
@@ -62,33 +68,36 @@ pub struct ClockCourse {
 impl ClockCourse {
     /// Of the reference itself.
     pub(super) fn reference() -> Self {
-        Self { spline: None, steps: Vec::new(), readings: Vec::new() }
+        Self { smooth: None, steps: Vec::new(), readings: Vec::new() }
     }
 
-    /// Through readings. `None` if no spline goes through them, and with those of fewer than two samples.
-    pub(super) fn new(mut readings: Vec<ClockReading>, rate_walk: f64) -> Option<Self> {
+    /// Through readings of a recording with these steps. `None` if no spline goes through them, and with
+    /// those of fewer than two samples.
+    pub(super) fn new(mut readings: Vec<ClockReading>, steps: Vec<Step>) -> Option<Self> {
         let has_two_samples = readings.iter().any(|reading| reading.sample != readings[0].sample);
         if !has_two_samples {
             return None;
         }
+        weigh(&mut readings);
         for _ in 0..ROUNDS {
-            let spline = spline(&readings, rate_walk)?;
-            let worst = contradictory(&spline);
+            let worst = contradictory(&Smooth::new(&readings)?.spline);
             // Without two samples nothing is left to be judged by.
             if worst.is_empty() || readings.len() < worst.len() + 2 {
-                return Some(Self { spline: Some(spline), steps: Vec::new(), readings });
+                break;
             }
             for k in worst.into_iter().rev() {
                 readings.remove(k);
             }
         }
-        Some(Self { spline: Some(spline(&readings, rate_walk)?), steps: Vec::new(), readings })
+        let smooth = Smooth::new(&readings)?;
+        readings.iter_mut().for_each(|reading| reading.deviation *= smooth.scale);
+        Some(Self { smooth: Some(smooth), steps, readings })
     }
 
     /// The instant of a sample, in samples of the reference.
     pub fn at(&self, sample: f64) -> f64 {
         let mended = self.mended(sample);
-        mended - self.known(mended).value
+        mended - self.lag(mended)
     }
 
     /// Standard deviation of the instant of a sample, in samples of the reference.
@@ -108,16 +117,21 @@ impl ClockCourse {
     }
 
     /// By how much a sample of the mended recording is larger than its instant.
+    pub(super) fn lag(&self, mended: f64) -> f64 {
+        self.smooth.as_ref().map_or(0.0, |smooth| smooth.spline.value(mended))
+    }
+
+    /// The same with its deviation.
     pub(super) fn known(&self, mended: f64) -> Estimate<f64> {
-        let Some(spline) = &self.spline else { return Estimate { value: 0.0, sigma: 0.0 } };
+        let Some(Smooth { spline, scale }) = &self.smooth else { return Estimate { value: 0.0, sigma: 0.0 } };
         let known = spline.at(mended);
-        Estimate { value: known.value, sigma: known.variance.sqrt() }
+        Estimate { value: known.value, sigma: scale * known.variance.sqrt() }
     }
 
     /// The sample of the mended recording that was taken at an instant.
     pub(super) fn sample_at(&self, instant: f64) -> f64 {
         // Clocks differ so little that each round gains three digits.
-        (0..INVERSE_ROUNDS).fold(instant, |sample, _| instant + self.known(sample).value)
+        (0..INVERSE_ROUNDS).fold(instant, |sample, _| instant + self.lag(sample))
     }
 
     /// By how much the clock is fast: the slope of the line that is closest to the lags. Their first and
@@ -134,8 +148,9 @@ impl ClockCourse {
         let slope = sum(&|one| (one.sample - middle) * (one.lag - mean)) / squares;
         let misfit = sum(&|one| (one.lag - mean - slope * (one.sample - middle)).powi(2));
         let freedom = self.readings.len().saturating_sub(2).max(1) as f64;
+        let scatter = (misfit / freedom * of_few(freedom) / squares).sqrt();
         // From samples of the recording to those of the reference.
-        Estimate { value: slope / (1.0 - slope), sigma: (misfit / freedom).max(1.0).sqrt() / squares.sqrt() }
+        Estimate { value: slope / (1.0 - slope), sigma: scatter }
     }
 
     /// The reading of a piece, unless it has none or that was refused.
@@ -144,35 +159,84 @@ impl ClockCourse {
     }
 }
 
-fn spline(readings: &[ClockReading], rate_walk: f64) -> Option<SmoothingSpline> {
-    let measured = |reading: &ClockReading| Measured {
-        x: reading.sample,
-        value: reading.lag,
-        error: reading.deviation,
-        jitter: 0.0,
-    };
-    SmoothingSpline::new(readings.iter().map(measured).collect(), rate_walk).ok()
+/// A spline through readings whose deviations are right up to a factor.
+#[derive(Debug, Clone)]
+struct Smooth {
+    spline: SmoothingSpline,
+    /// The factor.
+    scale: f64,
+}
+
+impl Smooth {
+    /// The spline whose rate walks such that each reading is best predicted by the others (leave-one-out
+    /// predictive density; S. Geisser, *The predictive sample reuse method*, J. Am. Stat. Assoc. 70, 1975).
+    fn new(readings: &[ClockReading]) -> Option<Self> {
+        let measured = |reading: &ClockReading| Measured {
+            x: reading.sample,
+            value: reading.lag,
+            error: reading.deviation,
+            jitter: 0.0,
+        };
+        let all: Vec<Measured> = readings.iter().map(measured).collect();
+        let walks = std::iter::once(0.0).chain(WALKS.map(|exponent| 10f64.powi(exponent)));
+        let splines = walks.filter_map(|walk| SmoothingSpline::new(all.clone(), walk).ok());
+        let judged = splines.map(|spline| (Judged::new(&spline), spline));
+        let (judged, spline) = judged.min_by(|a, b| a.0.surprise.total_cmp(&b.0.surprise))?;
+        let freedom = readings.len().saturating_sub(2).max(1) as f64;
+        Some(Self { spline, scale: judged.scale * of_few(freedom).sqrt() })
+    }
+}
+
+/// How well each reading is predicted by the others.
+struct Judged {
+    /// Root mean square of what readings miss the others by, over the stated deviations.
+    scale: f64,
+    /// Mean of the negative logarithm of the predictive density.
+    surprise: f64,
+}
+
+impl Judged {
+    fn new(spline: &SmoothingSpline) -> Self {
+        let all: Vec<LeftOut> = spline.left_out().collect();
+        let ratios = || all.iter().map(|out| out.miss / out.deviation);
+        let most = MOST_MISFIT * usual(ratios());
+        let count = all.len() as f64;
+        let scale = (ratios().map(|ratio| ratio.min(most).powi(2)).sum::<f64>() / count).sqrt();
+        let scale = scale.max(LEAST_SCALE);
+        let deviations = all.iter().map(|out| out.deviation.ln()).sum::<f64>() / count;
+        Self { scale, surprise: deviations + scale.ln() }
+    }
+}
+
+/// Square of the factor by which a deviation that was measured with so many degrees of freedom is short of
+/// that whose 95 % interval is that of the normal law: Student's law, within 3 %.
+pub(super) fn of_few(freedom: f64) -> f64 {
+    (1.0 + 1.2 / freedom + 2.4 / (freedom * freedom)).powi(2)
+}
+
+/// The standard deviation of a normal law that has the same median of absolute values.
+fn usual(misfits: impl Iterator<Item = f64>) -> f64 {
+    median(misfits.collect()) / MEDIAN_OF_NORMAL
 }
 
 /// The samples that contradict the others, each the worst of those beside it.
 fn contradictory(spline: &SmoothingSpline) -> Vec<usize> {
-    let found: Vec<f64> = spline.contradictions().collect();
+    let found: Vec<f64> = spline.left_out().map(|out| out.miss / out.deviation).collect();
+    let gate = GATE_SIGMAS * usual(found.iter().copied());
     let is_worst = |k: &usize| {
         let beside = k.saturating_sub(BESIDE)..(k + BESIDE + 1).min(found.len());
-        found[*k] > GATE_SIGMAS && beside.into_iter().all(|j| j == *k || found[j] < found[*k])
+        found[*k] > gate && beside.into_iter().all(|j| j == *k || found[j] < found[*k])
     };
     (0..found.len()).filter(is_worst).collect()
 }
 
-/// Widens the intervals to what the readings beside each scatter. Intervals of pieces are
-/// those of the Cramer-Rao bound, which pieces of little or narrow sound miss by up to twice, while the
-/// others reach it.
+/// Weighs readings by what those beside each scatter. Deviations of pieces are those of the Cramer-Rao
+/// bound, which pieces of little or narrow sound miss by up to twice, while the others reach it.
 ///
 /// Misfits are second differences in their stated deviations; overlapping ones are correlated by -2/3 and
 /// 1/6. The variance of a reading relative to the stated one has the scaled inverse chi-square law whose
-/// prior, of two degrees of freedom, is the stated variance, and whose data are the misfits: its mean is
-/// theirs plus 2 over their degrees of freedom.
-pub(super) fn widen(readings: &mut [ClockReading]) {
+/// prior, of two degrees of freedom, is the usual one, and whose data are the misfits.
+fn weigh(readings: &mut [ClockReading]) {
     let misfit = |three: &[ClockReading]| {
         let [before, own, after] = [three[0], three[1], three[2]];
         let share = (own.sample - before.sample) / (after.sample - before.sample);
@@ -181,16 +245,14 @@ pub(super) fn widen(readings: &mut [ClockReading]) {
         miss.abs() / deviation.hypot(share * after.deviation)
     };
     let misfits: Vec<f64> = readings.windows(3).map(misfit).collect();
-    let mut sorted = misfits.clone();
-    sorted.sort_by(f64::total_cmp);
-    let Some(median) = sorted.get(sorted.len() / 2) else { return };
-    let most = MOST_MISFIT * (median / MEDIAN_OF_NORMAL).max(1.0);
+    let usual = usual(misfits.iter().copied()).max(LEAST_SCALE);
     let factor = |number: usize| {
         // The misfit of a reading is one before it, because the first reading has none.
-        let beside = number.saturating_sub(WIDENED_BY + 1)..(number + WIDENED_BY).min(misfits.len());
+        let beside = number.saturating_sub(WEIGHED_BY + 1)..(number + WEIGHED_BY).min(misfits.len());
         let freedom = beside.len() as f64 / (1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0));
-        let squares: f64 = misfits[beside.clone()].iter().map(|misfit| misfit.min(most).powi(2)).sum();
-        (squares / beside.len() as f64 + 2.0 / freedom).max(1.0).sqrt()
+        let square = |misfit: &f64| misfit.min(MOST_MISFIT * usual).powi(2);
+        let mean = misfits[beside.clone()].iter().map(square).sum::<f64>() / beside.len().max(1) as f64;
+        ((freedom * mean + 2.0 * usual * usual) / (freedom + 2.0)).sqrt()
     };
     readings.iter_mut().enumerate().for_each(|(number, reading)| reading.deviation *= factor(number));
 }
@@ -211,14 +273,12 @@ mod tests {
         (0..count).map(reading).collect()
     }
 
-    const RATE_WALK: f64 = 1e-15;
-
     /// A rate that changes by 2 ppm in a thousand samples: the lags err as the course states.
     #[test]
     fn the_stated_error_is_that_of_the_lags() {
         let lag = |k: f64| 10.0 + 3e-6 * k + 5e-4 * (2e-3 * k).sin();
         let all = readings(400, 20, 2e-5, lag);
-        let course = ClockCourse::new(all.clone(), RATE_WALK).unwrap();
+        let course = ClockCourse::new(all.clone(), Vec::new()).unwrap();
         let (mut smoothed, mut stated) = (0.0, 0.0);
         for reading in &all[60..340] {
             let k = reading.sample;
@@ -235,7 +295,7 @@ mod tests {
         for k in [3, 77, 78, 150] {
             all[k].lag += 1e-3;
         }
-        let course = ClockCourse::new(all, RATE_WALK).unwrap();
+        let course = ClockCourse::new(all, Vec::new()).unwrap();
         let refused: Vec<usize> = (0..200).filter(|piece| course.reading(*piece).is_none()).collect();
         assert_eq!(refused, [3, 77, 78, 150]);
         let miss = course.at(1550.0) - (1540.0 - 3e-6 * 1550.0);
@@ -245,7 +305,7 @@ mod tests {
     #[test]
     fn one_reading_has_no_course() {
         let all = readings(5, 20, 1e-8, |k| k);
-        assert!(ClockCourse::new(all[..1].to_vec(), RATE_WALK).is_none());
+        assert!(ClockCourse::new(all[..1].to_vec(), Vec::new()).is_none());
     }
 
     /// Nor has a reading whose interval is no number.
@@ -253,13 +313,13 @@ mod tests {
     fn readings_without_numbers_have_no_course() {
         let mut all = readings(5, 20, 1e-8, |k| k);
         all[2].deviation = f64::NAN;
-        assert!(ClockCourse::new(all, RATE_WALK).is_none());
+        assert!(ClockCourse::new(all, Vec::new()).is_none());
     }
 
     #[test]
     fn lost_samples_are_steps_of_the_course() {
-        let mut course = ClockCourse::new(readings(5, 20, 1e-8, |_| 10.0), RATE_WALK).unwrap();
-        course.steps = vec![Step { samples: 30..32, lost: 7 }, Step { samples: 60..60, lost: -2 }];
+        let steps = vec![Step { samples: 30..32, lost: 7 }, Step { samples: 60..60, lost: -2 }];
+        let course = ClockCourse::new(readings(5, 20, 1e-8, |_| 10.0), steps).unwrap();
         let instants = [29.0, 31.0, 32.0, 59.5, 60.0, 61.0].map(|k| course.at(k));
         let want = [19.0, 21.0, 29.0, 56.5, 55.0, 56.0];
         assert!(instants.iter().zip(&want).all(|(a, b)| (a - b).abs() < 1e-6), "{instants:?}");

@@ -1,8 +1,8 @@
 //! The delays over the time that all recordings have in common, and the spec for them.
 
-use super::clock::{ClockCourse, ClockReading, widen};
+use super::clock::{ClockCourse, ClockReading, Step, of_few};
 use super::pieces::PieceEstimate;
-use super::{AlignSettings, AlignWarning, AlignedChannel, Reading, Stretches};
+use super::{AlignWarning, AlignedChannel, Reading, Stretches};
 use crate::calibrate::{Calibration, ChannelEstimate, Warning, applied};
 use crate::sine_fit::Estimate;
 use crate::spec::{HALF_WIDTH, Spec};
@@ -38,26 +38,23 @@ impl<'a> Course<'a> {
     /// `None` if there are not two delays of each channel.
     pub(super) fn new(
         spec: &'a Spec,
-        settings: AlignSettings,
+        reference: usize,
+        steps: &[Vec<Step>],
         estimates: &[PieceEstimate],
         stretches: &Stretches,
     ) -> Option<Self> {
-        let walk = settings.rate_walk * spec.fast_period.0 * spec.ratio as f64;
         let clock = |i: usize| {
             let of = |(piece, estimate): (usize, &PieceEstimate)| {
                 let (sample, lag) = estimate.lags[i]?;
                 Some(ClockReading { piece, sample, lag: lag.value, deviation: lag.sigma })
             };
-            if i == settings.reference {
+            if i == reference {
                 return Some(ClockCourse::reference());
             }
-            let mut readings: Vec<ClockReading> = estimates.iter().enumerate().filter_map(of).collect();
-            widen(&mut readings);
-            ClockCourse::new(readings, walk)
+            ClockCourse::new(estimates.iter().enumerate().filter_map(of).collect(), steps[i].clone())
         };
         let clocks = (0..spec.channels.len()).map(clock).collect::<Option<_>>()?;
         let centres = estimates.iter().map(|estimate| estimate.centre).collect();
-        let reference = settings.reference;
         let &Stretches { first, end, .. } = stretches;
         Some(Self { spec, reference, clocks, centres, first, end })
     }
@@ -114,6 +111,10 @@ impl<'a> Course<'a> {
     pub(super) fn delay(&self, i: usize, skips: &[usize]) -> Estimate<Seconds> {
         let Estimate { value, sigma } = self.at(i, skips[i] as f64);
         Estimate { value: value - self.cut(i, skips), sigma }
+    }
+
+    pub(super) fn steps(&self, i: usize) -> &[Step] {
+        self.clocks[i].steps()
     }
 
     pub(super) fn drift(&self, i: usize) -> Estimate<f64> {
@@ -190,7 +191,7 @@ impl<'a> Course<'a> {
     }
 }
 
-/// The weighted mean of estimates; its deviation is that of their scatter where it is larger.
+/// The weighted mean of estimates; its deviation is that of their scatter, as far as they are enough.
 pub(super) fn mean(estimates: impl Iterator<Item = Estimate<f64>>) -> Option<Estimate<f64>> {
     // Without noise a deviation may be 0.
     let weighted = |estimate: Estimate<f64>| (estimate.value, estimate.sigma.max(1e-12).powi(-2));
@@ -198,6 +199,7 @@ pub(super) fn mean(estimates: impl Iterator<Item = Estimate<f64>>) -> Option<Est
     let weights: f64 = all.iter().map(|(_, weight)| weight).sum();
     let value = all.iter().map(|(value, weight)| value * weight).sum::<f64>() / weights;
     let squares: f64 = all.iter().map(|(x, weight)| weight * (x - value).powi(2)).sum();
-    let misfit = squares / all.len().saturating_sub(1).max(1) as f64;
-    value.is_finite().then(|| Estimate { value, sigma: (misfit.max(1.0) / weights).sqrt() })
+    let freedom = all.len().saturating_sub(1) as f64;
+    let misfit = if freedom > 0.0 { squares / freedom * of_few(freedom) } else { 1.0 };
+    value.is_finite().then(|| Estimate { value, sigma: (misfit / weights).sqrt() })
 }

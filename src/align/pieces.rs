@@ -4,12 +4,12 @@
 //! cross-correlation gives its lag to a part of a sample, and a blind calibration the rest. Each is measured
 //! on its own, so no piece is lost where some are zero.
 
+use super::local::{LocalLag, Place};
 use super::{AlignError, Stretches};
 use crate::calibrate::{
-    CalibrateError, CalibrationSignal, ChannelEstimate, Correlation, LagLine, Record, Settings, calibrate,
-    longest_run, steadied, stretch,
+    CalibrateError, CalibrationSignal, ChannelEstimate, LagLine, Record, Settings, calibrate, longest_run,
+    steadied,
 };
-use crate::linalg::fourier;
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
 use crate::units::FastPeriods;
@@ -26,11 +26,6 @@ const BESIDE: usize = 7;
 const NEAR_LAG: f64 = 1.5;
 /// The delay of a piece is at most so many slow periods from its lag.
 const FARTHEST: f64 = 1.0;
-
-/// Another lag whose correlation has this share of the highest one says as much as that.
-const ALIKE_CORRELATION: f64 = 0.9;
-/// Samples from the highest correlation within which all others belong to its peak.
-const PEAK_SAMPLES: usize = 2;
 
 /// The recordings of all channels and where they are compared.
 pub(super) struct Pieces<'a> {
@@ -54,22 +49,9 @@ pub(super) struct PieceEstimate {
     pub(super) lags: Vec<Option<(f64, Estimate<f64>)>>,
 }
 
-/// What the correlation in one piece says of the lag of a recording.
-#[derive(Debug, Clone, Copy)]
-struct LocalLag {
-    /// Samples beyond the line.
-    beyond: f64,
-    /// Share of the largest possible correlation, with its sign.
-    height: f64,
-    /// No other lag says as much.
-    is_alone: bool,
-}
-
-impl LocalLag {
-    /// Whether it is the only lag that the correlation shows, and the one that the pieces beside it show.
-    fn says(&self, beyond: f64) -> bool {
-        self.is_alone && (self.beyond - beyond).abs() <= NEAR_LAG
-    }
+/// Whether a lag is the only one that the correlation shows, and the one that the pieces beside it show.
+fn says(lag: &LocalLag, beyond: f64) -> bool {
+    lag.is_alone && (lag.beyond - beyond).abs() <= NEAR_LAG
 }
 
 impl<'a> Pieces<'a> {
@@ -93,7 +75,7 @@ impl<'a> Pieces<'a> {
             self.expect_gain(i, local.iter().map(|lag| lag.height).sum());
             let beyond: Vec<f64> = (0..local.len()).map(|number| likely(&local, number)).collect();
             let weight = |agrees: bool| -> f64 {
-                let of_kind = |(lag, beyond): &(&LocalLag, &f64)| lag.says(**beyond) == agrees;
+                let of_kind = |(lag, beyond): &(&LocalLag, &f64)| says(lag, **beyond) == agrees;
                 local.iter().zip(&beyond).filter(of_kind).map(|(lag, _)| lag.height.powi(2)).sum()
             };
             if weight(false) > weight(true) {
@@ -126,26 +108,8 @@ impl<'a> Pieces<'a> {
     /// The lag of recording i as it correlates with the reference.
     fn local_lag(&self, first: usize, i: usize, line: &LagLine) -> LocalLag {
         let &Stretches { length, margin, .. } = self.stretches;
-        let size = (length + 2 * margin).next_power_of_two();
-        let expected = line.lag_at(self.centre(first));
-        let begin = first as i64 + expected.round() as i64 - margin as i64;
-        let mut other = stretch(&self.records[i], begin, length + 2 * margin);
-        other.resize(size, 0.0);
-        let own = stretch(&self.records[self.settings.reference], first as i64, length);
-        let sums = Correlation::with(&own, size).of(&fourier::real_spectrum(&other));
-        let shifts = 1..2 * margin;
-        let best = shifts.clone().max_by(|a, b| sums[*a].abs().total_cmp(&sums[*b].abs())).unwrap_or(margin);
-        // The vertex of the parabola through three values.
-        let [before, at, after] = [best - 1, best, best + 1].map(|n| sums[n]);
-        let part = 0.5 * (before - after) / (before - 2.0 * at + after);
-        let part = if part.abs() <= 0.5 { part } else { 0.0 };
-        let lag = (begin + best as i64 - first as i64) as f64 + part;
-        let height = |n: usize| sums[n].abs();
-        let is_peak = |n: usize| height(n) >= height(n - 1).max(height(n + 1));
-        let is_rival = |n: usize| {
-            n.abs_diff(best) > PEAK_SAMPLES && is_peak(n) && height(n) >= ALIKE_CORRELATION * height(best)
-        };
-        LocalLag { beyond: lag - expected, height: at, is_alone: !shifts.clone().any(is_rival) }
+        let place = Place { first, length, expected: line.lag_at(self.centre(first)), margin };
+        LocalLag::new(&self.records[self.settings.reference], &self.records[i], place)
     }
 
     /// Expects that recording i has its level, and the polarity with which it `correlates`.

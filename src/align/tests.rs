@@ -19,7 +19,7 @@ fn spec(recorders: usize) -> Spec {
 }
 
 fn settings() -> AlignSettings {
-    AlignSettings { reference: 0, within: None, rate_walk: 1e-12 }
+    AlignSettings { reference: 0, within: None }
 }
 
 /// One recorder.
