@@ -1,9 +1,10 @@
 //! When the samples of a recording were taken, on the clock of the reference.
 
-use super::path::median;
+use super::path::usual;
 use crate::sampling::nonuniform::Measured;
 use crate::sampling::{LeftOut, SmoothingSpline};
 use crate::sine_fit::Estimate;
+use serde::Serialize;
 use std::ops::Range;
 
 /// Readings beyond this many standard deviations of what the others say are refused.
@@ -13,12 +14,13 @@ const ROUNDS: usize = 12;
 /// Readings on each side of the worst one that are judged again without it.
 const BESIDE: usize = 4;
 
-/// Median of the absolute values of a normal law, in its deviations.
-const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 /// Misfits on each side that say how far a reading scatters: sounds change after some pieces.
 const WEIGHED_BY: usize = 6;
 /// Readings without any noise scatter by this share of their deviations.
 const LEAST_SCALE: f64 = 1e-3;
+/// A sum of negative logarithms that is larger than the least by this may be the right one: half the 95 %
+/// point of chi-square with one degree of freedom.
+const LIKELY_SURPRISE: f64 = 1.92;
 /// Powers of ten of the variance by which a rate may walk per sample. That of 1 ppm in a second is 2e-17 at
 /// 48 kHz.
 const WALKS: std::ops::RangeInclusive<i32> = -26..=-9;
@@ -42,7 +44,7 @@ pub(super) struct ClockReading {
 }
 
 /// A place where a recording lacks samples, or has some that the reference has not.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Step {
     /// Samples of the recording, as given, among which it lies: what they hold belongs to neither side.
     pub samples: Range<usize>,
@@ -168,7 +170,7 @@ struct Smooth {
 }
 
 impl Smooth {
-    /// The spline whose rate walks such that each reading is best predicted by the others (leave-one-out
+    /// The smoothest spline whose readings are predicted by the others as well as by any (leave-one-out
     /// predictive density; S. Geisser, *The predictive sample reuse method*, J. Am. Stat. Assoc. 70, 1975).
     fn new(readings: &[ClockReading]) -> Option<Self> {
         let measured = |reading: &ClockReading| Measured {
@@ -180,8 +182,11 @@ impl Smooth {
         let all: Vec<Measured> = readings.iter().map(measured).collect();
         let walks = std::iter::once(0.0).chain(WALKS.map(|exponent| 10f64.powi(exponent)));
         let splines = walks.filter_map(|walk| SmoothingSpline::new(all.clone(), walk).ok());
-        let judged = splines.map(|spline| (Judged::new(&spline), spline));
-        let (judged, spline) = judged.min_by(|a, b| a.0.surprise.total_cmp(&b.0.surprise))?;
+        let judged: Vec<(Judged, SmoothingSpline)> =
+            splines.map(|spline| (Judged::new(&spline), spline)).collect();
+        let least = judged.iter().map(|(judged, _)| judged.surprise).fold(f64::INFINITY, f64::min);
+        let is_good = |(judged, _): &(Judged, SmoothingSpline)| judged.surprise <= least + LIKELY_SURPRISE;
+        let (judged, spline) = judged.into_iter().find(is_good)?;
         let freedom = readings.len().saturating_sub(2).max(1) as f64;
         Some(Self { spline, scale: judged.scale * of_few(freedom).sqrt() })
     }
@@ -191,7 +196,7 @@ impl Smooth {
 struct Judged {
     /// Root mean square of what readings miss the others by, over the stated deviations.
     scale: f64,
-    /// Mean of the negative logarithm of the predictive density.
+    /// Sum of the negative logarithms of the predictive densities.
     surprise: f64,
 }
 
@@ -199,12 +204,12 @@ impl Judged {
     fn new(spline: &SmoothingSpline) -> Self {
         let all: Vec<LeftOut> = spline.left_out().collect();
         let ratios = || all.iter().map(|out| out.miss / out.deviation);
-        let most = MOST_MISFIT * usual(ratios());
+        let most = MOST_MISFIT * usual(ratios().collect());
         let count = all.len() as f64;
         let scale = (ratios().map(|ratio| ratio.min(most).powi(2)).sum::<f64>() / count).sqrt();
         let scale = scale.max(LEAST_SCALE);
-        let deviations = all.iter().map(|out| out.deviation.ln()).sum::<f64>() / count;
-        Self { scale, surprise: deviations + scale.ln() }
+        let deviations = all.iter().map(|out| out.deviation.ln()).sum::<f64>();
+        Self { scale, surprise: deviations + count * scale.ln() }
     }
 }
 
@@ -214,15 +219,10 @@ pub(super) fn of_few(freedom: f64) -> f64 {
     (1.0 + 1.2 / freedom + 2.4 / (freedom * freedom)).powi(2)
 }
 
-/// The standard deviation of a normal law that has the same median of absolute values.
-fn usual(misfits: impl Iterator<Item = f64>) -> f64 {
-    median(misfits.collect()) / MEDIAN_OF_NORMAL
-}
-
 /// The samples that contradict the others, each the worst of those beside it.
 fn contradictory(spline: &SmoothingSpline) -> Vec<usize> {
     let found: Vec<f64> = spline.left_out().map(|out| out.miss / out.deviation).collect();
-    let gate = GATE_SIGMAS * usual(found.iter().copied());
+    let gate = GATE_SIGMAS * usual(found.clone());
     let is_worst = |k: &usize| {
         let beside = k.saturating_sub(BESIDE)..(k + BESIDE + 1).min(found.len());
         found[*k] > gate && beside.into_iter().all(|j| j == *k || found[j] < found[*k])
@@ -245,7 +245,7 @@ fn weigh(readings: &mut [ClockReading]) {
         miss.abs() / deviation.hypot(share * after.deviation)
     };
     let misfits: Vec<f64> = readings.windows(3).map(misfit).collect();
-    let usual = usual(misfits.iter().copied()).max(LEAST_SCALE);
+    let usual = usual(misfits.clone()).max(LEAST_SCALE);
     let factor = |number: usize| {
         // The misfit of a reading is one before it, because the first reading has none.
         let beside = number.saturating_sub(WEIGHED_BY + 1)..(number + WEIGHED_BY).min(misfits.len());

@@ -7,6 +7,7 @@
 
 use super::local::{LocalLag, Place};
 use crate::calibrate::{LagLine, Record};
+use std::f64::consts::FRAC_1_SQRT_2;
 use std::ops::Range;
 
 /// Samples of a piece: at 2000 ppm the lag moves by four samples within it.
@@ -15,8 +16,9 @@ const SHORTEST_PIECE: usize = 256;
 /// Number of pieces, where the length allows for it.
 const LEAST_PIECES: usize = 16;
 const MOST_PIECES: usize = 8192;
-/// Most lines.
+/// Most lines, and most pieces that are looked for in vain: where one recording is silent or had ended.
 const MOST_LINES: usize = 32;
+const MOST_IN_VAIN: usize = 16;
 /// Pieces of a stretch that is looked for.
 const PROBE_PIECES: usize = 4;
 /// Log-odds from which on a piece is on a line: of ten thousand lags one is there by chance.
@@ -26,13 +28,18 @@ const MOST_ODDS: f64 = 50.0;
 const CHANGE_ODDS: f64 = 30.0;
 /// Pieces on each side whose median a piece is to agree with.
 const BESIDE: usize = 3;
-/// Samples by which it may differ.
-pub(super) const NEAR_LAG: f64 = 1.5;
+/// Samples by which it may differ: so many standard deviations, but no less and no more than these.
+const NEAR_SIGMAS: f64 = 6.0;
+const LEAST_NEAR: f64 = 0.3;
+const MOST_NEAR: f64 = 1.5;
 
 /// Share of the pieces that agree, at least.
 const LEAST_SHARE: f64 = 0.5;
 /// Pieces between those whose lags give the rate.
 const RATE_PIECES: usize = 16;
+
+/// Median of the absolute values of a normal law, in its deviations.
+const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 
 /// A piece whose lag is known.
 #[derive(Debug, Clone, Copy)]
@@ -46,6 +53,8 @@ pub(super) struct Known {
 pub(super) struct Path {
     pub(super) known: Vec<Known>,
     pub(super) rate: f64,
+    /// By how many samples lags of pieces in a row differ at most.
+    pub(super) near: f64,
 }
 
 /// Most pieces agree with no line, or not with those beside them.
@@ -104,12 +113,12 @@ impl<'a> Search<'a> {
 
     /// Adds the lines of the pieces that are on none.
     fn look(&mut self) {
-        let mut looked_at = vec![false; self.firsts.len()];
-        while self.lines.len() < MOST_LINES {
+        let (mut looked_at, mut in_vain) = (vec![false; self.firsts.len()], 0);
+        while self.lines.len() < MOST_LINES && in_vain < MOST_IN_VAIN {
             let path = self.path();
             let is_lost = |piece: usize| {
                 let lag = &self.lags[path[piece]][piece];
-                !looked_at[piece] && lag.as_ref().is_some_and(|lag| lag.odds < ON_LINE_ODDS)
+                !looked_at[piece] && lag.as_ref().is_none_or(|lag| lag.odds < ON_LINE_ODDS)
             };
             let runs = runs((0..path.len()).map(is_lost)).into_iter().filter(|run| run.len() > 1);
             let level = |run: &Range<usize>| self.levels[run.clone()].iter().sum::<f64>();
@@ -119,8 +128,9 @@ impl<'a> Search<'a> {
             looked_at[begin..begin + pieces].fill(true);
             let line = self.lines[path[begin]];
             let samples = self.firsts[begin]..self.firsts[begin] + pieces * self.length;
-            if let Some(line) = line.parallel(self.reference, self.other, samples) {
-                self.add(line);
+            match line.parallel(self.reference, self.other, samples) {
+                Some(line) => self.add(line),
+                None => in_vain += 1,
             }
         }
     }
@@ -167,9 +177,11 @@ impl<'a> Search<'a> {
         let found: Vec<(usize, Known)> = there.iter().filter_map(|piece| known(*piece)).collect();
         let rate = rate(&found.iter().map(|found| found.1).collect::<Vec<_>>());
         let beyond: Vec<f64> = found.iter().map(|(_, known)| known.lag - rate * known.at).collect();
+        let moves = beyond.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+        let near = (NEAR_SIGMAS * usual(moves) * FRAC_1_SQRT_2).clamp(LEAST_NEAR, MOST_NEAR);
         let agrees = |k: usize| {
             let beside = k.saturating_sub(BESIDE)..(k + BESIDE + 1).min(beyond.len());
-            (beyond[k] - median(beyond[beside].to_vec())).abs() <= NEAR_LAG
+            (beyond[k] - median(beyond[beside].to_vec())).abs() <= near
         };
         let found: Vec<(usize, Known)> = (0..found.len()).filter(|k| agrees(*k)).map(|k| found[k]).collect();
         let level =
@@ -178,7 +190,7 @@ impl<'a> Search<'a> {
         if found.len() < 2 || agreeing < LEAST_SHARE * level(&mut there.iter().copied()) {
             return Err(Disagree { agreeing: found.len(), pieces: there.len() });
         }
-        Ok(Path { known: found.into_iter().map(|found| found.1).collect(), rate })
+        Ok(Path { known: found.into_iter().map(|found| found.1).collect(), rate, near })
     }
 }
 
@@ -187,6 +199,11 @@ fn rate(known: &[Known]) -> f64 {
     let apart = RATE_PIECES.min(known.len() / 4).max(1);
     let slope = |pair: (&Known, &Known)| (pair.1.lag - pair.0.lag) / (pair.1.at - pair.0.at);
     median(known.iter().zip(known.iter().skip(apart)).map(slope).collect())
+}
+
+/// The standard deviation of a normal law that has the same median of absolute values.
+pub(super) fn usual(misfits: Vec<f64>) -> f64 {
+    median(misfits) / MEDIAN_OF_NORMAL
 }
 
 /// The median; 0 of nothing.

@@ -4,7 +4,7 @@
 //! it fit the reference best at the one lag, and those after it at the other.
 
 use super::clock::Step;
-use super::path::{Disagree, Known, NEAR_LAG, Path, Search, median};
+use super::path::{Disagree, Known, Path, Search, median};
 use crate::calibrate::{LagLine, Record, interpolated, stretch};
 use crate::simulate::Instants;
 use crate::units::FastPeriods;
@@ -69,11 +69,11 @@ pub(super) fn spliced<T: Copy>(samples: &[T], steps: &[Step], filler: T) -> Vec<
 
 /// Where lags of pieces in a row differ by more than clocks do.
 fn jumps(path: &Path) -> Vec<Jump> {
-    let Path { known, rate } = path;
+    let Path { known, rate, near } = path;
     let beyond: Vec<f64> = known.iter().map(|known| known.lag - rate * known.at).collect();
     let is_jump = |k: &usize| {
         let apart = known[*k].at - known[k - 1].at;
-        (beyond[*k] - beyond[k - 1]).abs() > NEAR_LAG + RATE_WANDERS * apart
+        (beyond[*k] - beyond[k - 1]).abs() > 2.0 * near + RATE_WANDERS * apart
     };
     let mut cuts = vec![0];
     cuts.extend((1..known.len()).filter(is_jump));
