@@ -22,6 +22,8 @@ const LARGEST_DEVIATION: f64 = 0.25;
 const LEAST_DEVIATION: f64 = 1e-6;
 /// Pieces on each side whose lags say where that of a piece is to be.
 const BESIDE: usize = 7;
+/// Share of the pieces that give delays, at least, each by its level.
+const LEAST_SHARE: f64 = 0.5;
 /// Samples by which the lag of a piece may differ from what the pieces beside it say.
 const NEAR_LAG: f64 = 1.5;
 /// The delay of a piece is at most so many slow periods from its lag.
@@ -86,19 +88,30 @@ impl<'a> Pieces<'a> {
                 lags[i] = line.lag_at(self.centre(*first)) + beyond;
             }
         }
-        let (mut found, mut reason) = (Vec::new(), None);
+        let (mut found, mut reason, mut said, mut all) = (Vec::new(), None, 0.0, 0.0);
         for (first, lags) in firsts.iter().zip(&lags) {
+            let level = self.level(*first);
+            all += level;
             match self.estimate(*first, lags) {
-                Ok(estimate) => found.extend(estimate),
+                Ok(Some(estimate)) => {
+                    found.push(estimate);
+                    said += level;
+                }
+                Ok(None) => {}
+                // Lost samples speak neither for nor against the others.
+                Err(CalibrateError::TooShort { .. }) => all -= level,
                 Err(error) => reason = Some(error),
             }
         }
-        let pieces = firsts.len();
-        if found.is_empty() {
-            Err(AlignError::NotMeasured { measured: 0, pieces, reason })
-        } else {
-            Ok(found)
+        match found.is_empty() || said < LEAST_SHARE * all {
+            true => Err(AlignError::NotMeasured { measured: found.len(), pieces: firsts.len(), reason }),
+            false => Ok(found),
         }
+    }
+
+    /// How loud a piece is.
+    fn level(&self, first: usize) -> f64 {
+        self.records[self.settings.reference].part(first..first + self.stretches.length).rms()
     }
 
     fn centre(&self, first: usize) -> f64 {

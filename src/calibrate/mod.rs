@@ -47,7 +47,7 @@ mod record;
 mod starts;
 #[cfg(test)]
 #[path = "tests/testbench.rs"]
-mod testbench;
+pub(crate) mod testbench;
 mod tones;
 mod warning;
 mod waveform;
