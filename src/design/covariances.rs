@@ -9,8 +9,8 @@
 use super::DesignError;
 use super::lifting::JointState;
 use super::problem::Problem;
-use crate::linalg::{self, Complex, Mat};
 use crate::linalg::GAUSS_LEGENDRE;
+use crate::linalg::{self, Complex, Mat};
 use crate::lti::gramian::controllability_root;
 use crate::units::FastPeriods;
 use std::f64::consts::TAU;
