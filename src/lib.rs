@@ -8,6 +8,9 @@ pub use hybank_core::{bank, files, io, messages, npy, pipeline, quantity, spec, 
 /// samples.
 pub use hybank_runtime as runtime;
 
+/// The crate `hybank-instants`: the signal behind samples at known instants.
+pub use hybank_instants as instants;
+
 /// The crate `hybank-linalg`: matrix decompositions and Fourier transforms.
 pub use hybank_linalg as linalg;
 
@@ -25,6 +28,7 @@ pub mod interchange;
 pub mod lmi;
 pub mod lti;
 pub mod measure;
+pub mod merge;
 pub mod overview;
 pub mod plot;
 pub mod simulate;

@@ -8,7 +8,7 @@ use super::capture_file::{start, unread};
 use super::file_kind::FileKind;
 use super::print::{Failure, check_json, failed, failed_at, is_dash, say_understood, show, warn};
 use super::written::{Mono, begin_file, begin_recording, check_outputs, write_text, write_together};
-use hybank::align::{AlignError, AlignSettings, AlignedChannel, Alignment, RATE_WALK, align};
+use hybank::align::{AlignError, AlignSettings, AlignedChannel, Alignment, Step, align};
 use hybank::calibrate::{CalibrateError, Record};
 use hybank::captures::Captures;
 use hybank::figures::Alone;
@@ -19,7 +19,6 @@ use hybank::sine_fit::Estimate;
 use hybank::spec::{DesignOverrides, Spec};
 use hybank::units::Seconds;
 use std::fmt::Write as _;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Hertz of recordings that state no rate, for a spec in normalised time.
@@ -52,8 +51,8 @@ pub(super) struct Args {
     /// The spec with the values found; `-` is standard output
     #[arg(short, long)]
     output: PathBuf,
-    /// Write the recordings from their first common sample on into this folder: ch1.wav, ch2.wav, .., and
-    /// drift.jsonl, their delays over time as JSON lines
+    /// Write the recordings from their first common sample on into this folder: ch1.wav, ch2.wav, .., with
+    /// NaN for lost samples, and drift.jsonl, their delays over time as JSON lines
     #[arg(long, value_name = "DIR")]
     trim: Option<PathBuf>,
     /// How far apart the recordings began at most, as 50ms or 2s
@@ -165,7 +164,7 @@ impl Args {
         if within.is_some_and(|time| time < Seconds(0.0)) {
             return Err(Failure::Usage("--within: a time is not negative".into()));
         }
-        Ok(AlignSettings { reference: reference(self.reference, spec)?, within, rate_walk: unit * RATE_WALK })
+        Ok(AlignSettings { reference: reference(self.reference, spec)?, within })
     }
 
     /// Writes all outputs, which appear together; `others` are those beside the spec.
@@ -185,8 +184,8 @@ impl Args {
         let begin_text = |(path, text): (&PathBuf, &str)| begin_file(path, text.as_bytes(), self.force);
         let begin = |channel: Option<usize>| {
             let Some(i) = channel else { return texts.clone().map(begin_text).collect() };
-            let skip = found.channels[i].skip;
-            begin_recording(&trimmed[i], recordings.mono(i, skip..skip + found.frames), self.force)
+            let (skip, whole) = (found.channels[i].skip, found.mended(i, &recordings.records[i].samples));
+            begin_recording(&trimmed[i], recordings.mono(i, &whole[skip..skip + found.frames]), self.force)
         };
         write_together(folder, (0..trimmed.len()).map(Some).chain([None]).map(Ok), begin)?;
         if is_file { Ok(()) } else { write_text(&self.output, spec, self.force) }
@@ -196,8 +195,7 @@ impl Args {
 impl Recordings {
     /// A WAV file of some samples of channel `i` in their own format; lost ones are NaN, which integers have
     /// not.
-    fn mono(&self, i: usize, samples: Range<usize>) -> Mono<'_> {
-        let samples = &self.records[i].samples[samples];
+    fn mono<'a>(&self, i: usize, samples: &'a [f64]) -> Mono<'a> {
         let has_lost = samples.iter().any(|x| x.is_nan());
         let format = match (self.formats[i].is_float(), self.formats[i].bytes()) {
             (true, 4) => PcmFormat::F32Le,
@@ -239,10 +237,12 @@ struct ChannelReport {
     drift_ppm: Interval,
     gain: Interval,
     offset: Interval,
+    /// Where samples were lost or came in.
+    steps: Vec<Step>,
 }
 
 impl ChannelReport {
-    fn new(spec: &Spec, channel: usize, found: &AlignedChannel) -> Self {
+    fn new(spec: &Spec, channel: usize, found: &AlignedChannel, steps: &[Step]) -> Self {
         let h = spec.fast_period;
         let Estimate { value, sigma } = found.delay;
         let delay = Estimate { value: value.in_fast_periods(h), sigma: sigma.in_fast_periods(h) };
@@ -254,6 +254,7 @@ impl ChannelReport {
             drift_ppm: interval(drift),
             gain: interval(found.gain),
             offset: interval(found.offset),
+            steps: steps.to_vec(),
         }
     }
 }
@@ -267,7 +268,9 @@ impl Report {
             frames: found.frames,
             pieces: found.pieces,
             measured: found.measured,
-            channels: channels.map(|(i, one)| ChannelReport::new(spec, i + 1, one)).collect(),
+            channels: channels
+                .map(|(i, one)| ChannelReport::new(spec, i + 1, one, found.instants(i).steps()))
+                .collect(),
             alone,
             one_suffices: alone.suffices(),
             warnings,

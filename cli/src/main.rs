@@ -26,6 +26,7 @@ mod gaps;
 mod import;
 mod interrupt;
 mod measure;
+mod merge;
 mod observer;
 mod output;
 mod plot;
@@ -58,6 +59,7 @@ use std::process::ExitCode;
     after_help = "\
 Examples:
   hybank demo
+  hybank merge left.wav right.wav -o merged.wav
   hybank init -o spec.toml
   hybank help spec
   hybank design spec.toml -o bank.json
@@ -86,6 +88,7 @@ enum Command {
     Simulate(simulate::Args),
     Calibrate(calibrate::Args),
     Align(align::Args),
+    Merge(merge::Args),
     Fuse(fuse::Args),
     Measure(measure::Args),
     Stream(stream::Args),
@@ -119,6 +122,7 @@ fn dispatch(command: Command) -> Result<(), Failure> {
         Command::Simulate(args) => simulate::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Align(args) => align::run(&args),
+        Command::Merge(args) => merge::run(&args),
         Command::Fuse(args) => fuse::run(&args),
         Command::Measure(args) => measure::run(&args),
         Command::Stream(args) => stream::run(&args),

@@ -27,6 +27,18 @@ pub type Mat = DMatrix<f64>;
 /// Complex matrix of run-time size.
 pub type CMat = DMatrix<Complex<f64>>;
 
+/// Eight-point Gauss-Legendre abscissae on [0, 1] and weights (Abramowitz & Stegun, table 25.4).
+pub const GAUSS_LEGENDRE: [(f64, f64); 8] = [
+    (0.019855071751231912, 0.05061426814518853),
+    (0.10166676129318664, 0.11119051722668721),
+    (0.2372337950418355, 0.15685332293894344),
+    (0.4082826787521751, 0.18134189168918083),
+    (0.5917173212478248, 0.18134189168918083),
+    (0.7627662049581645, 0.15685332293894344),
+    (0.8983332387068134, 0.11119051722668721),
+    (0.9801449282487681, 0.05061426814518853),
+];
+
 /// Why a decomposition failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]

@@ -361,6 +361,10 @@ class Alignment:
         By how many ppm each clock is fast.
     gain, offset
         Gain and offset of each channel.
+    steps
+        Per channel where its recording lost samples: each step has the ``samples`` among which it lies (``start``,
+        ``end``), and how many were ``lost``, below 0 for samples that came in. ``skip`` counts samples after the lost
+        ones were put back.
     track
         The delays over time as JSON lines.
     alone
@@ -381,6 +385,7 @@ class Alignment:
     drift_ppm: NDArray[np.float64]
     gain: NDArray[np.float64]
     offset: NDArray[np.float64]
+    steps: list[list[Record]]
     track: str
     alone: Record
     one_suffices: bool

@@ -28,11 +28,7 @@ pub(crate) fn align<'py>(
         return Err(refused("within: give a time in seconds, not negative"));
     }
     let all = x.iter().map(record_of).collect::<PyResult<Vec<_>>>()?;
-    let settings = AlignSettings {
-        reference: reference_of(&spec, reference)?,
-        within: within.map(Seconds),
-        rate_walk: alignment::RATE_WALK,
-    };
+    let settings = AlignSettings { reference: reference_of(&spec, reference)?, within: within.map(Seconds) };
     let found = background::run(py, None, move |_| {
         let found = alignment::align(&spec, &all, settings).map_err(|error| error.to_string())?;
         let alone = Alone::new(&found.spec).map_err(|error| error.to_string())?;
@@ -49,6 +45,8 @@ fn record_of(x: &Bound<'_, PyAny>) -> PyResult<Record> {
 
 fn result<'py>(py: Python<'py>, found: &Alignment, alone: Alone) -> PyResult<Bound<'py, PyAny>> {
     let column = |of: fn(&AlignedChannel) -> f64| PyArray1::from_iter(py, found.channels.iter().map(of));
+    let steps_of = |i: usize| found.instants(i).steps().iter().map(|step| record(py, step)).collect();
+    let steps = (0..found.channels.len()).map(steps_of).collect::<PyResult<Vec<Vec<_>>>>()?;
     let lines = found.readings.iter().map(|reading| reading.line() + "\n");
     found.warnings.iter().try_for_each(|warning| warn(py, warning))?;
     Made::new(py, "Alignment")?
@@ -62,6 +60,7 @@ fn result<'py>(py: Python<'py>, found: &Alignment, alone: Alone) -> PyResult<Bou
         .with("drift_ppm", column(|channel| 1e6 * channel.drift.value))?
         .with("gain", column(|channel| channel.gain.value))?
         .with("offset", column(|channel| channel.offset.value))?
+        .with("steps", steps)?
         .with("track", lines.collect::<String>())?
         .with("alone", record(py, &alone)?)?
         .with("one_suffices", alone.suffices())?

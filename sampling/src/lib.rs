@@ -21,7 +21,7 @@ mod smoothing;
 pub use fit::{Fit, FitSample};
 pub use fit2::Fit2;
 pub use recurrent::Recurrent;
-pub use smoothing::SmoothingSpline;
+pub use smoothing::{LeftOut, SmoothingSpline};
 
 /// Faults of sample sets, offsets and settings handed to the sampling core.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,7 +1,9 @@
 //! Why recordings cannot be aligned, and what a reader of an alignment must know.
 
+use super::clock::Step;
 use crate::calibrate::{CalibrateError, Warning};
 use crate::units::{FastPeriods, Seconds};
+use std::ops::Range;
 
 /// Why recordings cannot be aligned.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -49,6 +51,22 @@ pub enum AlignError {
         channel: usize,
         /// Samples by which the channel may have begun before the reference.
         lags: Vec<i64>,
+    },
+    /// The pieces of two recordings have no course of the lag in common.
+    #[error(
+        "only {agreeing} of {pieces} pieces of the recordings of channels {reference} and {channel} agree with the others \
+         on the lag, and most must, by their level; check that both recorded the same event, that neither is drowned in \
+         noise, stretched in time or cut together from parts, and that their clocks differ by less than 2000 ppm"
+    )]
+    Disagree {
+        /// From 1.
+        reference: usize,
+        /// From 1.
+        channel: usize,
+        /// Pieces that agree.
+        agreeing: usize,
+        /// Pieces that were compared.
+        pieces: usize,
     },
     /// At each instant the signal is narrow: a sweep, a tone that glides. Most pieces show several lags, or
     /// another one than those beside them.
@@ -102,6 +120,17 @@ pub enum AlignWarning {
         /// Largest minus smallest delay.
         moved: FastPeriods,
     },
+    /// Samples were lost, or came in.
+    #[error(
+        "the recording of channel {channel} {}: they are left out, and the delays follow the step",
+        stepped(step)
+    )]
+    Step {
+        /// From 1.
+        channel: usize,
+        /// Where, and how many.
+        step: Step,
+    },
     /// Two channels come to sample at one instant.
     #[error(
         "{at:.3} after the first frame the channels {} and {} sample at one instant: no bank recovers the signal there. \
@@ -125,4 +154,20 @@ fn numbers(lags: &[i64]) -> String {
 
 fn because(reason: &Option<CalibrateError>) -> String {
     reason.as_ref().map_or_else(String::new, |reason| format!(": {reason}"))
+}
+
+fn stepped(Step { samples, lost }: &Step) -> String {
+    let Range { start, end } = samples;
+    let place = if start == end {
+        format!("at sample {start}")
+    } else {
+        format!("between samples {start} and {end}")
+    };
+    match lost {
+        1.. => format!("lost {lost} samples {place}"),
+        _ => format!(
+            "has {} samples {place} that the reference lacks, because they came in or it lost them",
+            -lost
+        ),
+    }
 }

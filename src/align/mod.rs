@@ -5,15 +5,19 @@
 //! gains and offsets. A smoothing spline goes through the delays, as through any readings that are known
 //! beforehand.
 
+mod clock;
 mod coincidence;
 mod course;
 mod error;
+mod local;
+mod path;
 mod pieces;
 mod reading;
+mod steps;
 #[cfg(test)]
 mod tests;
-mod timeline;
 
+pub use clock::{ClockCourse, Step};
 pub use error::{AlignError, AlignWarning};
 pub use reading::Reading;
 
@@ -24,7 +28,9 @@ use crate::sine_fit::Estimate;
 use crate::spec::Spec;
 use crate::units::Seconds;
 use course::{Course, mean};
+use path::Disagree;
 use pieces::{PieceEstimate, Pieces};
+use steps::{Placed, mended, spliced};
 
 /// Least samples that all recordings have in common.
 const LEAST_SAMPLES: usize = 1024;
@@ -43,10 +49,6 @@ const MOST_PIECES: usize = 1024;
 /// step of 24 bits and of any converter.
 const LEAST_LEVEL: f64 = 1e-8;
 
-/// Variance by which the rate of a clock walks in a second, in (s/s)^2 / s, unless more is known: that of
-/// 1 ppm.
-pub const RATE_WALK: f64 = 1e-12;
-
 /// How recordings are aligned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AlignSettings {
@@ -54,12 +56,10 @@ pub struct AlignSettings {
     pub reference: usize,
     /// How far apart the recordings began at most, if that is known.
     pub within: Option<Seconds>,
-    /// Variance by which a rate walks in a second, in (s/s)^2 / s; see [`RATE_WALK`].
-    pub rate_walk: f64,
 }
 
 /// How recordings lie in time.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Alignment {
     /// The reference channel, from 0.
     pub reference: usize,
@@ -78,12 +78,38 @@ pub struct Alignment {
     pub spec: Spec,
     /// What a reader of the values must know.
     pub warnings: Vec<AlignWarning>,
+    clocks: Vec<ClockCourse>,
+}
+
+impl Alignment {
+    /// When the samples of the recording of a channel, from 0, were taken. The reference has its own time.
+    ///
+    /// ```text
+    /// let clock = alignment.instants(1);
+    /// clock.at(480.0)             // instant of sample 480, in samples of the reference
+    /// clock.deviation(480.0)      // its standard deviation
+    /// ```
+    ///
+    /// # Panics
+    /// If there is no such channel.
+    pub fn instants(&self, channel: usize) -> &ClockCourse {
+        &self.clocks[channel]
+    }
+
+    /// The samples of a channel, from 0, without the steps of its recording: NaN for those that are lost or
+    /// belong to neither side of a step. [`AlignedChannel::skip`] counts these.
+    ///
+    /// # Panics
+    /// If there is no such channel.
+    pub fn mended(&self, channel: usize, samples: &[f64]) -> Vec<f64> {
+        spliced(samples, self.clocks[channel].steps(), f64::NAN)
+    }
 }
 
 /// How the recording of one channel lies in time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AlignedChannel {
-    /// Samples before the first frame: what to cut off.
+    /// Samples before the first frame: what to cut off of [`Alignment::mended`].
     pub skip: usize,
     /// The delay at the first frame; it grows with the drift.
     pub delay: Estimate<Seconds>,
@@ -101,7 +127,7 @@ pub struct AlignedChannel {
 /// # Errors
 /// [`AlignError`].
 pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result<Alignment, AlignError> {
-    let AlignSettings { reference, within, .. } = settings;
+    let AlignSettings { reference, within } = settings;
     let fit = Settings { fit: Fit::default(), reference };
     check(spec, records, fit)?;
     check_parts(records, &CalibrationSignal::Any)?;
@@ -111,24 +137,38 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
     if let Some(i) = records.iter().position(|record| record.rms() < LEAST_LEVEL) {
         return Err(AlignError::Silent { channel: i + 1 });
     }
-    let frames = records.iter().map(|record| record.samples.len()).min().unwrap_or(0);
-    enough(frames)?;
+    enough(records.iter().map(|record| record.samples.len()).min().unwrap_or(0))?;
     let within = within.map_or(f64::INFINITY, |time| time / (spec.fast_period * spec.ratio as f64));
-    let line = |i: usize| {
-        let found = (i != reference).then(|| line(&records[reference], &records[i], within));
-        let (reference, channel) = (reference + 1, i + 1);
-        found.transpose().map_err(|lags| match lags.is_empty() {
-            true => AlignError::NothingInCommon { reference, channel },
-            false => AlignError::Ambiguous { reference, channel, lags },
-        })
+    let placed = |i: usize| match i == reference {
+        true => Ok(Placed { record: records[i].clone(), steps: Vec::new(), line: None }),
+        false => placed(records, reference, i, within),
     };
-    let lines = (0..records.len()).map(line).collect::<Result<Vec<_>, _>>()?;
-    let stretches = Stretches::new(records, reference, &lines)?;
+    let placed = (0..records.len()).map(placed).collect::<Result<Vec<_>, _>>()?;
+    let lines: Vec<Option<LagLine>> = placed.iter().map(|placed| placed.line).collect();
+    let steps: Vec<Vec<Step>> = placed.iter().map(|placed| placed.steps.clone()).collect();
+    let whole: Vec<Record> = placed.into_iter().map(|placed| placed.record).collect();
+    let stretches = Stretches::new(&whole, reference, &lines)?;
     let pieces = stretches.firsts().len();
-    let estimates = Pieces::new(spec, records, fit, &stretches).measure(&lines)?;
+    let estimates = Pieces::new(spec, &whole, fit, &stretches).measure(&lines)?;
     let few = AlignError::NotMeasured { measured: estimates.len(), pieces, reason: None };
-    let course = Course::new(spec, settings, &estimates, &stretches).ok_or(few)?;
-    Ok(alignment(spec, records, &course, &estimates, pieces))
+    let course = Course::new(spec, reference, &steps, &estimates, &stretches).ok_or(few)?;
+    Ok(alignment(spec, &whole, course, &estimates, pieces))
+}
+
+/// The recording of channel `i` with its steps mended, and where it lies beside the reference.
+fn placed(records: &[Record], reference: usize, i: usize, within: f64) -> Result<Placed, AlignError> {
+    let (own, other) = (&records[reference], &records[i]);
+    let (reference, channel) = (reference + 1, i + 1);
+    let line = line(own, other, within).map_err(|lags| match lags.is_empty() {
+        true => AlignError::NothingInCommon { reference, channel },
+        false => AlignError::Ambiguous { reference, channel, lags },
+    })?;
+    mended(own, other, line).map_err(|Disagree { agreeing, pieces }| AlignError::Disagree {
+        reference,
+        channel,
+        agreeing,
+        pieces,
+    })
 }
 
 /// Refuses recordings that have too few samples in common.
@@ -177,7 +217,7 @@ impl Stretches {
 fn alignment(
     spec: &Spec,
     records: &[Record],
-    course: &Course<'_>,
+    course: Course<'_>,
     estimates: &[PieceEstimate],
     pieces: usize,
 ) -> Alignment {
@@ -205,6 +245,10 @@ fn alignment(
     if counts.iter().any(|&count| count > 0) {
         warnings.push(AlignWarning::Values(Warning::Clipped { counts }));
     }
+    for i in 0..channels.len() {
+        let steps = course.steps(i).iter().cloned();
+        warnings.extend(steps.map(|step| AlignWarning::Step { channel: i + 1, step }));
+    }
     let measured = estimates.len();
     let (spec, raised) = course.spec(&channels, &mut warnings);
     channels.iter_mut().for_each(|channel| channel.delay.value += spec.fast_period * raised as f64);
@@ -216,5 +260,6 @@ fn alignment(
             .extend(met.map(|(pair, at)| AlignWarning::Coincidence { channels: pair.map(|i| i + 1), at }));
     }
     let readings = course.readings(&skips, raised);
-    Alignment { reference, channels, frames, pieces, measured, readings, spec, warnings }
+    let clocks = course.into_clocks();
+    Alignment { reference, channels, frames, pieces, measured, readings, spec, warnings, clocks }
 }

@@ -4,28 +4,30 @@
 //! cross-correlation gives its lag to a part of a sample, and a blind calibration the rest. Each is measured
 //! on its own, so no piece is lost where some are zero.
 
+use super::local::{LocalLag, Place};
 use super::{AlignError, Stretches};
 use crate::calibrate::{
-    CalibrateError, CalibrationSignal, ChannelEstimate, Correlation, LagLine, Record, Settings, calibrate,
-    longest_run, steadied, stretch,
+    CalibrateError, CalibrationSignal, ChannelEstimate, LagLine, Record, Settings, calibrate, longest_run,
+    steadied,
 };
-use crate::linalg::fourier;
+use crate::sine_fit::Estimate;
 use crate::spec::Spec;
+use crate::units::FastPeriods;
 
 /// A measurement with a larger standard deviation says nothing, in fast periods: its interval is as wide as
 /// the distance of two channels.
 const LARGEST_DEVIATION: f64 = 0.25;
+/// Least standard deviation of a lag in samples: what a drift within a piece and the rounding of the fit may
+/// do.
+const LEAST_DEVIATION: f64 = 1e-6;
 /// Pieces on each side whose lags say where that of a piece is to be.
 const BESIDE: usize = 7;
+/// Share of the pieces that give delays, at least, each by its level.
+const LEAST_SHARE: f64 = 0.5;
 /// Samples by which the lag of a piece may differ from what the pieces beside it say.
 const NEAR_LAG: f64 = 1.5;
 /// The delay of a piece is at most so many slow periods from its lag.
 const FARTHEST: f64 = 1.0;
-
-/// Another lag whose correlation has this share of the highest one says as much as that.
-const ALIKE_CORRELATION: f64 = 0.9;
-/// Samples from the highest correlation within which all others belong to its peak.
-const PEAK_SAMPLES: usize = 2;
 
 /// The recordings of all channels and where they are compared.
 pub(super) struct Pieces<'a> {
@@ -42,26 +44,16 @@ pub(super) struct Pieces<'a> {
 pub(super) struct PieceEstimate {
     /// Sample of the reference at its middle.
     pub(super) centre: f64,
-    /// One per channel; D_i of samples that count from that of the reference.
+    /// One per channel: gains and offsets.
     pub(super) channels: Vec<ChannelEstimate>,
+    /// One per channel: a sample of it, and by how much that is larger than its instant in samples of the
+    /// reference.
+    pub(super) lags: Vec<Option<(f64, Estimate<f64>)>>,
 }
 
-/// What the correlation in one piece says of the lag of a recording.
-#[derive(Debug, Clone, Copy)]
-struct LocalLag {
-    /// Samples beyond the line.
-    beyond: f64,
-    /// Share of the largest possible correlation, with its sign.
-    height: f64,
-    /// No other lag says as much.
-    is_alone: bool,
-}
-
-impl LocalLag {
-    /// Whether it is the only lag that the correlation shows, and the one that the pieces beside it show.
-    fn says(&self, beyond: f64) -> bool {
-        self.is_alone && (self.beyond - beyond).abs() <= NEAR_LAG
-    }
+/// Whether a lag is the only one that the correlation shows, and the one that the pieces beside it show.
+fn says(lag: &LocalLag, beyond: f64) -> bool {
+    lag.is_alone && (lag.beyond - beyond).abs() <= NEAR_LAG
 }
 
 impl<'a> Pieces<'a> {
@@ -85,7 +77,7 @@ impl<'a> Pieces<'a> {
             self.expect_gain(i, local.iter().map(|lag| lag.height).sum());
             let beyond: Vec<f64> = (0..local.len()).map(|number| likely(&local, number)).collect();
             let weight = |agrees: bool| -> f64 {
-                let of_kind = |(lag, beyond): &(&LocalLag, &f64)| lag.says(**beyond) == agrees;
+                let of_kind = |(lag, beyond): &(&LocalLag, &f64)| says(lag, **beyond) == agrees;
                 local.iter().zip(&beyond).filter(of_kind).map(|(lag, _)| lag.height.powi(2)).sum()
             };
             if weight(false) > weight(true) {
@@ -96,19 +88,30 @@ impl<'a> Pieces<'a> {
                 lags[i] = line.lag_at(self.centre(*first)) + beyond;
             }
         }
-        let (mut found, mut reason) = (Vec::new(), None);
+        let (mut found, mut reason, mut said, mut all) = (Vec::new(), None, 0.0, 0.0);
         for (first, lags) in firsts.iter().zip(&lags) {
+            let level = self.level(*first);
+            all += level;
             match self.estimate(*first, lags) {
-                Ok(estimate) => found.extend(estimate),
+                Ok(Some(estimate)) => {
+                    found.push(estimate);
+                    said += level;
+                }
+                Ok(None) => {}
+                // Lost samples speak neither for nor against the others.
+                Err(CalibrateError::TooShort { .. }) => all -= level,
                 Err(error) => reason = Some(error),
             }
         }
-        let pieces = firsts.len();
-        if found.is_empty() {
-            Err(AlignError::NotMeasured { measured: 0, pieces, reason })
-        } else {
-            Ok(found)
+        match found.is_empty() || said < LEAST_SHARE * all {
+            true => Err(AlignError::NotMeasured { measured: found.len(), pieces: firsts.len(), reason }),
+            false => Ok(found),
         }
+    }
+
+    /// How loud a piece is.
+    fn level(&self, first: usize) -> f64 {
+        self.records[self.settings.reference].part(first..first + self.stretches.length).rms()
     }
 
     fn centre(&self, first: usize) -> f64 {
@@ -118,26 +121,8 @@ impl<'a> Pieces<'a> {
     /// The lag of recording i as it correlates with the reference.
     fn local_lag(&self, first: usize, i: usize, line: &LagLine) -> LocalLag {
         let &Stretches { length, margin, .. } = self.stretches;
-        let size = (length + 2 * margin).next_power_of_two();
-        let expected = line.lag_at(self.centre(first));
-        let begin = first as i64 + expected.round() as i64 - margin as i64;
-        let mut other = stretch(&self.records[i], begin, length + 2 * margin);
-        other.resize(size, 0.0);
-        let own = stretch(&self.records[self.settings.reference], first as i64, length);
-        let sums = Correlation::with(&own, size).of(&fourier::real_spectrum(&other));
-        let shifts = 1..2 * margin;
-        let best = shifts.clone().max_by(|a, b| sums[*a].abs().total_cmp(&sums[*b].abs())).unwrap_or(margin);
-        // The vertex of the parabola through three values.
-        let [before, at, after] = [best - 1, best, best + 1].map(|n| sums[n]);
-        let part = 0.5 * (before - after) / (before - 2.0 * at + after);
-        let part = if part.abs() <= 0.5 { part } else { 0.0 };
-        let lag = (begin + best as i64 - first as i64) as f64 + part;
-        let height = |n: usize| sums[n].abs();
-        let is_peak = |n: usize| height(n) >= height(n - 1).max(height(n + 1));
-        let is_rival = |n: usize| {
-            n.abs_diff(best) > PEAK_SAMPLES && is_peak(n) && height(n) >= ALIKE_CORRELATION * height(best)
-        };
-        LocalLag { beyond: lag - expected, height: at, is_alone: !shifts.clone().any(is_rival) }
+        let place = Place { first, length, expected: line.lag_at(self.centre(first)), margin };
+        LocalLag::new(&self.records[self.settings.reference], &self.records[i], place)
     }
 
     /// Expects that recording i has its level, and the polarity with which it `correlates`.
@@ -166,18 +151,31 @@ impl<'a> Pieces<'a> {
         let (begin, frames) = longest_run(&parts);
         let parts: Vec<Record> = parts.iter().map(|part| part.part(begin..begin + frames)).collect();
         let found = calibrate(&spec, &parts, &CalibrationSignal::Any, self.settings)?;
-        let centre = (first + begin) as f64 + 0.5 * (frames as f64 - 1.0);
-        let mut channels = found.channels;
-        for (i, channel) in channels.iter_mut().enumerate() {
-            let Some(delay) = channel.delay.as_mut() else { continue };
+        // Steadied recordings agree with their own clocks in the middle of the piece.
+        let middle = 0.5 * (length as f64 - 1.0);
+        let beside = begin as f64 + 0.5 * (frames as f64 - 1.0) - middle;
+        let centre = first as f64 + middle + beside;
+        let mut all = Vec::new();
+        for (i, channel) in found.channels.iter().enumerate() {
+            let Some(delay) = channel.delay else {
+                all.push(None);
+                continue;
+            };
             let moved = (delay.value - spec.channels[i].delay.in_fast_periods(h)).0.abs();
             let is_known = delay.sigma.0 <= LARGEST_DEVIATION && moved <= FARTHEST * spec.ratio as f64;
             if !is_known {
                 return Ok(None);
             }
-            delay.value += (slow * shifts[i]).in_fast_periods(h);
+            let in_samples = |periods: FastPeriods| periods.0 / spec.ratio as f64;
+            let later = in_samples(delay.value - own.in_fast_periods(h));
+            let sample = first as f64 + shifts[i] + middle + (1.0 + self.rates[i]) * beside;
+            let lag = Estimate {
+                value: sample - centre + later,
+                sigma: in_samples(delay.sigma).max(LEAST_DEVIATION),
+            };
+            all.push(Some((sample, lag)));
         }
-        Ok(Some(PieceEstimate { centre, channels }))
+        Ok(Some(PieceEstimate { centre, channels: found.channels, lags: all }))
     }
 }
 

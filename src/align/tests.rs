@@ -2,10 +2,13 @@
 
 use super::*;
 use crate::calibrate::CalibrateError;
+use crate::calibrate::testbench::gaussian;
 use crate::design::Problem;
 use crate::random::Random;
 use crate::simulate::{Analog, Converter, Recording};
+use crate::spec::HALF_WIDTH;
 use crate::units::FastPeriods;
+use std::f64::consts::{PI, TAU};
 
 /// Recorders of 8 kHz that pass 3 kHz, for a target of 1.5 kHz at the same rate.
 fn spec(recorders: usize) -> Spec {
@@ -19,7 +22,7 @@ fn spec(recorders: usize) -> Spec {
 }
 
 fn settings() -> AlignSettings {
-    AlignSettings { reference: 0, within: None, rate_walk: 1e-12 }
+    AlignSettings { reference: 0, within: None }
 }
 
 /// One recorder.
@@ -158,6 +161,129 @@ fn lost_and_clipped_samples_are_left_out() {
     let clipped = AlignWarning::Values(Warning::Clipped { counts: vec![0, 9] });
     assert!(
         matches!(&found.warnings[..], [first, AlignWarning::FixedTaps { channel: 2, .. }] if *first == clipped)
+    );
+}
+
+/// Tones of any frequency up to 0.7 of half the rate, which no two draws share.
+struct Event(Vec<[f64; 2]>);
+
+impl Event {
+    fn new(dice: &mut Random) -> Self {
+        Self((0..80).map(|_| [0.7 * PI * dice.part(), TAU * dice.part()]).collect())
+    }
+
+    /// Taken at first, first + step, .., with noise of this deviation.
+    fn taken(&self, first: f64, step: f64, count: usize, noise: f64, dice: &mut Random) -> Vec<f64> {
+        let level = 0.2 / (self.0.len() as f64).sqrt();
+        let wave = |t: f64| self.0.iter().map(|[w, phase]| (w * t + phase).sin()).sum::<f64>();
+        (0..count).map(|k| level * wave(first + step * k as f64) + noise * gaussian(dice)).collect()
+    }
+}
+
+/// Samples by which the second recorder of a scene began late.
+const LATE: f64 = 900.37;
+
+/// Two recorders, of which the second one is fast by so many ppm, with the noise of a signal-to-noise ratio.
+fn scene(ppm: f64, decibels: f64, count: usize, seed: u64) -> [Vec<f64>; 2] {
+    let mut dice = Random(seed);
+    let event = Event::new(&mut dice);
+    let noise = 0.2 * f64::sqrt(0.5) * 10f64.powf(-0.05 * decibels);
+    [(0.0, 1.0), (LATE, 1.0 / (1.0 + 1e-6 * ppm))]
+        .map(|(first, step)| event.taken(first, step, count, noise, &mut dice))
+}
+
+#[test]
+fn clocks_may_differ_by_2000_ppm() {
+    for (ppm, seed) in [(1200.0, 21), (-1990.0, 22), (1990.0, 23)] {
+        let found = aligned(&scene(ppm, 60.0, 100_000, seed)).unwrap();
+        let Estimate { value, sigma } = found.channels[1].drift;
+        assert!((1e6 * value - ppm).abs() < 5e6 * sigma && sigma < 1e-8, "{ppm}: {value:e} {sigma:e}");
+        assert!(2 * found.measured > found.pieces, "{} of {}", found.measured, found.pieces);
+        for k in [0.0, 30_000.5, 99_000.0] {
+            let miss = found.instants(1).at(k) - LATE - k / (1.0 + 1e-6 * ppm);
+            assert!(miss.abs() < 5.0 * found.instants(1).deviation(k), "{ppm} {k}: {miss:e}");
+        }
+    }
+}
+
+/// Where samples were lost or came in every sample still has its instant.
+#[test]
+fn steps_are_found_reported_and_followed() {
+    for (ppm, steps) in [
+        (20.0, vec![(40_000, 700)]),
+        (0.0, vec![(30_000, -700), (52_000, 480), (80_000, 480)]),
+        (1200.0, vec![(60_000, 1), (90_000, 20_000)]),
+    ] {
+        let [own, whole] = scene(ppm, 60.0, 120_000, 31);
+        let (mut other, mut numbers, mut begin) = (Vec::new(), Vec::new(), 0);
+        for &(place, lost) in &steps {
+            other.extend_from_slice(&whole[begin..place]);
+            numbers.extend(begin..place);
+            // What comes in has been heard before.
+            let surplus = i64::max(0, -lost) as usize;
+            other.extend_from_slice(&whole[place - 5000..place - 5000 + surplus]);
+            numbers.resize(other.len(), usize::MAX);
+            begin = place + i64::max(0, lost) as usize;
+        }
+        other.extend_from_slice(&whole[begin..]);
+        numbers.extend(begin..whole.len());
+        let found = aligned(&[own, other.clone()]).unwrap();
+        let clock = found.instants(1);
+        let lost = |step: &Step| step.lost;
+        assert_eq!(
+            clock.steps().iter().map(lost).collect::<Vec<_>>(),
+            steps.iter().map(|s| s.1).collect::<Vec<_>>()
+        );
+        assert!(clock.steps().iter().all(|step| step.samples.len() < 20 + i64::max(0, -step.lost) as usize));
+        let warned =
+            found.warnings.iter().filter(|warning| matches!(warning, AlignWarning::Step { channel: 2, .. }));
+        assert_eq!(warned.count(), steps.len());
+        for (k, number) in numbers.iter().enumerate() {
+            if clock.steps().iter().any(|step| step.samples.contains(&k)) {
+                continue;
+            }
+            assert_ne!(*number, usize::MAX, "{k} came in");
+            let miss = clock.at(k as f64) - LATE - *number as f64 / (1.0 + 1e-6 * ppm);
+            assert!(miss.abs() < 1e-3, "{ppm} {k}: {miss:e}");
+        }
+        // Mended recordings are whole.
+        assert_eq!(found.mended(1, &other).len(), whole.len());
+    }
+}
+
+/// Of 40 draws 95 % of the values lie within their 95 % intervals, as far as chance allows.
+#[test]
+fn intervals_are_those_of_the_errors() {
+    let (mut within, mut all) = (0, 0);
+    for draw in 0..40 {
+        let (ppm, decibels) = (20.0 * (draw % 2) as f64, 40.0 + 50.0 * draw as f64 / 39.0);
+        let found = aligned(&scene(ppm, decibels, 50_000, 100 + draw)).unwrap();
+        let (clock, rate) = (found.instants(1), 1.0 + 1e-6 * ppm);
+        let mut add = |miss: f64, sigma: f64| {
+            all += 1;
+            within += i32::from(miss.abs() <= HALF_WIDTH * sigma);
+        };
+        for k in [1000.0, 15_000.0, 25_000.0, 35_000.0, 48_000.0] {
+            add(clock.at(k) - LATE - k / rate, clock.deviation(k));
+        }
+        let AlignedChannel { drift, gain, offset, .. } = found.channels[1];
+        add(drift.value - (rate - 1.0), drift.sigma);
+        add(gain.value - 1.0, gain.sigma);
+        add(offset.value, offset.sigma);
+    }
+    let share = f64::from(within) / f64::from(all);
+    assert!((0.90..=0.98).contains(&share), "{within} of {all}");
+}
+
+#[test]
+fn recordings_of_which_most_pieces_disagree_are_refused() {
+    let [own, mut other] = scene(0.0, 60.0, 80_000, 41);
+    let [another, _] = scene(0.0, 60.0, 80_000, 42);
+    other[20_000..].copy_from_slice(&another[20_000..]);
+    let refused = aligned(&[own, other]).unwrap_err();
+    assert!(
+        matches!(refused, AlignError::Disagree { channel: 2, agreeing, pieces, .. } if 2 * agreeing < pieces),
+        "{refused}"
     );
 }
 

@@ -10,10 +10,11 @@ use crate::simulate::{Instants, Recording};
 use crate::sine_fit::Channel;
 use crate::units::FastPeriods;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
-/// Samples of the longest probe: at 100 ppm the lag moves by three samples within it, and the peak of the
-/// correlation is as much lower.
-const LONGEST_PROBE: usize = 1 << 15;
+/// Samples of the longest probes: at 100 ppm the lag moves by three samples within one, and the peak of the
+/// correlation is as much lower. Shorter ones find less in noise, but bear 2000 ppm: both are tried.
+const LONGEST_PROBES: [usize; 2] = [1 << 15, 1 << 11];
 /// A probe is this share of a recording, so that a quarter of it holds one, but no shorter than this.
 const PROBE_SHARE: usize = 12;
 const SHORTEST_PROBE: usize = 512;
@@ -25,8 +26,8 @@ const PROBES_PER_BLOCK: usize = 4;
 const PEAKS: usize = 4;
 /// Lags this near to each other, in samples, are one: a narrow band or a drift within the probe blurs them.
 const NEIGHBOURS: f64 = 16.0;
-/// Largest difference of two clocks. Crystals differ by up to 200 ppm.
-const MOST_DRIFT: f64 = 5e-4;
+/// Largest difference of two clocks. Crystals differ by up to 200 ppm, oscillators without one by 2000.
+const MOST_DRIFT: f64 = 2.2e-3;
 /// Log-odds against chance from which on lags count as found.
 const LEAST_ODDS: f64 = 30.0;
 /// Other lags with this share of the log-odds of the best ones explain the recordings as well: voices that
@@ -39,6 +40,9 @@ const ALIKE_WITHIN_PITCH: f64 = 0.9;
 /// Share of the largest possible correlation from which on recordings have something in common: different
 /// voices have 0.2, tones and loops 0.4.
 const IN_COMMON: f64 = 0.3;
+
+/// Samples on each side of the expected lag among which another one is looked for.
+const FARTHEST_STEP: usize = 1 << 20;
 
 /// Samples on each side of those between which a recording is interpolated.
 const INTERPOLATION_MARGIN: usize = 32;
@@ -53,10 +57,9 @@ struct Probe {
 
 /// The loudest stretch of each part of a recording that is not zero. Parts are so long that each holds one
 /// that begins at a multiple of half its length.
-fn probes(record: &Record) -> Vec<Probe> {
+fn probes(record: &Record, longest: usize) -> Vec<Probe> {
     let count = record.samples.len();
-    let length =
-        1 << (count / PROBE_SHARE).clamp(SHORTEST_PROBE.min(count / 2).max(1), LONGEST_PROBE).ilog2();
+    let length = 1 << (count / PROBE_SHARE).clamp(SHORTEST_PROBE.min(count / 2).max(1), longest).ilog2();
     let parts = (2 * count / (3 * length)).clamp(1, MOST_PROBES);
     let part = count / parts;
     let loudest = |number: usize| {
@@ -99,6 +102,15 @@ pub(crate) fn steadied(record: &Record, first: usize, length: usize, rate: f64) 
         *sample += steady - own;
     }
     part
+}
+
+/// The deviations of a record from its mean at these instants, in its samples.
+pub(crate) fn interpolated(record: &Record, instants: Instants) -> Vec<f64> {
+    let begin = instants.first.0.floor() as i64 - INTERPOLATION_MARGIN as i64;
+    let length = (instants.step.0 * instants.count as f64) as usize + 2 * INTERPOLATION_MARGIN + 1;
+    let around = stretch(record, begin, length);
+    let first = FastPeriods(instants.first.0 - begin as f64);
+    Recording::new(&around, FastPeriods(1.0)).sample_through(|_| Complex::ONE, Instants { first, ..instants })
 }
 
 /// The correlations of a stretch of `size` samples with a shorter one: at index l that of its samples from l
@@ -243,6 +255,32 @@ pub(crate) struct LagLine {
 }
 
 impl LagLine {
+    /// Through a lag at a sample of the reference, with a rate and by how much that may be wrong.
+    pub(crate) fn new(at: f64, lag: f64, rate: f64, rate_error: f64) -> Self {
+        Self { at, lag, rate, rate_error }
+    }
+
+    /// The line parallel to this one on which some samples of the reference lie in `other`, if one lag
+    /// stands out.
+    pub(crate) fn parallel(&self, reference: &Record, other: &Record, samples: Range<usize>) -> Option<Self> {
+        let (first, length) = (samples.start, samples.len());
+        let expected = first as i64 + self.lag_at(first as f64).round() as i64;
+        let inside = |sample: i64| sample.clamp(0, other.samples.len() as i64) as usize;
+        let farthest = FARTHEST_STEP as i64;
+        let near = inside(expected - farthest)..inside(expected + farthest + length as i64);
+        let begin = near.start;
+        let probe = Probe { first, samples: stretch(reference, first as i64, length) };
+        let mut found = lags(&[probe], &other.part(near), f64::INFINITY);
+        found.sort_by(|a, b| b.height.total_cmp(&a.height));
+        let best = found.first().filter(|best| odds(&[**best]) >= LEAST_ODDS)?;
+        let is_alike = |other: &&Lag| other.height >= ALIKE_WITHIN_PITCH * best.height;
+        (found.iter().filter(is_alike).count() == 1).then(|| Self {
+            at: best.at,
+            lag: best.lag + begin as f64,
+            ..*self
+        })
+    }
+
     /// The lag at a sample of the reference.
     pub(crate) fn lag_at(&self, sample: f64) -> f64 {
         self.lag + self.rate * (sample - self.at)
@@ -264,17 +302,25 @@ impl LagLine {
 /// # Errors
 /// The lags, in samples, that explain the recordings alike; none if no lag stands out.
 pub(crate) fn line(reference: &Record, other: &Record, within: f64) -> Result<LagLine, Vec<i64>> {
-    if reference.samples.len() <= other.samples.len() {
-        return likeliest(&lags(&probes(reference), other, within));
-    }
-    let lags = lags(&probes(other), reference, within);
-    likeliest(&lags.into_iter().map(Lag::reversed).collect::<Vec<_>>())
+    let found = LONGEST_PROBES.map(|longest| {
+        if reference.samples.len() <= other.samples.len() {
+            return lags(&probes(reference, longest), other, within);
+        }
+        let lags = lags(&probes(other, longest), reference, within);
+        lags.into_iter().map(Lag::reversed).collect()
+    });
+    let best = |lags: &[Lag]| lines(lags).first().map_or(0.0, |(odds, _)| *odds);
+    let [long, short] = &found;
+    likeliest(if best(long) >= best(short) { long } else { short })
 }
 
 /// The line on which most of the likely lags lie.
 fn likeliest(lags: &[Lag]) -> Result<LagLine, Vec<i64>> {
     let Some(&(best, line)) = lines(lags).first() else { return Err(Vec::new()) };
-    let others: Vec<Lag> = lags.iter().filter(|lag| !line.holds(lag)).copied().collect();
+    // Where samples were lost other probes have other lags. A lag is in doubt where its own probes have more.
+    let probes: Vec<usize> = on(&line, lags).iter().map(|lag| lag.probe).collect();
+    let is_other = |lag: &&Lag| !line.holds(lag) && probes.contains(&lag.probe);
+    let others: Vec<Lag> = lags.iter().filter(is_other).copied().collect();
     let mut alike = vec![line.lag];
     for (odds, other) in lines(&others) {
         let lag = other.lag_at(line.at);

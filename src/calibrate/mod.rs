@@ -47,7 +47,7 @@ mod record;
 mod starts;
 #[cfg(test)]
 #[path = "tests/testbench.rs"]
-mod testbench;
+pub(crate) mod testbench;
 mod tones;
 mod warning;
 mod waveform;
@@ -57,7 +57,7 @@ pub use contradiction::Contradiction;
 pub use error::CalibrateError;
 pub use estimates::{Calibration, ChannelEstimate, Tone, applied};
 pub use fit::Fit;
-pub(crate) use lags::{Correlation, LagLine, line, steadied, stretch};
+pub(crate) use lags::{Correlation, LagLine, interpolated, line, steadied, stretch};
 pub(crate) use model::Model;
 pub(crate) use record::longest_run;
 pub use record::{Acquisition, Record};

@@ -8,8 +8,8 @@
 use super::DesignError;
 use super::lifting::JointState;
 use super::problem::Problem;
+use crate::linalg::GAUSS_LEGENDRE;
 use crate::linalg::{self, Complex, Mat};
-use crate::lti::exponential::NODES;
 use crate::lti::gramian::controllability_root;
 use crate::units::FastPeriods;
 use std::f64::consts::TAU;
@@ -80,7 +80,7 @@ impl Covariances {
         let density = |t: f64| (-0.5 * (t / deviation).powi(2)).exp() * 2.0 / (deviation * TAU.sqrt());
         let (mut time, mut state, mut sum) = (0.0, self.inputs.column(front_end).into_owned(), 0.0);
         for width in self.panels(deviation, GAUSSIAN_REACH * deviation) {
-            for (part, share) in NODES {
+            for (part, share) in GAUSS_LEGENDRE {
                 let covariance = (output * (self.joint.transition(part * width) * &state))[0];
                 sum += share * width * density(time + part * width) * 2.0 * (power - covariance);
             }

@@ -1,7 +1,7 @@
 //! Nodes of an integral over the unit circle whose integrand is known beforehand.
 
 use crate::linalg::Complex;
-use crate::lti::exponential::NODES;
+use crate::linalg::GAUSS_LEGENDRE;
 use std::f64::consts::{PI, TAU};
 
 /// An angle theta with its share of a mean over 0 to pi.
@@ -41,7 +41,8 @@ impl Integrand<'_> {
             self.add_panels(middle, high, nodes);
         } else if width > 0.0 {
             nodes.extend(
-                NODES.map(|(part, share)| Node { theta: low + part * width, share: share * width / PI }),
+                GAUSS_LEGENDRE
+                    .map(|(part, share)| Node { theta: low + part * width, share: share * width / PI }),
             );
         }
     }

@@ -1,20 +1,6 @@
 //! Exact discretisation: square roots of the finite-time controllability Gramian.
 
-use crate::linalg::{self, Mat};
-
-/// Eight-point Gauss-Legendre abscissae on [0, 1] and weights (Abramowitz & Stegun, table 25.4).
-/// The integrand below is entire and, after halving, nearly constant: the rule's error
-/// (norm^16 / 16! with a norm of at most 1/2) is far below rounding.
-pub(crate) const NODES: [(f64, f64); 8] = [
-    (0.019855071751231912, 0.05061426814518853),
-    (0.10166676129318664, 0.11119051722668721),
-    (0.2372337950418355, 0.15685332293894344),
-    (0.4082826787521751, 0.18134189168918083),
-    (0.5917173212478248, 0.18134189168918083),
-    (0.7627662049581645, 0.15685332293894344),
-    (0.8983332387068134, 0.11119051722668721),
-    (0.9801449282487681, 0.05061426814518853),
-];
+use crate::linalg::{self, GAUSS_LEGENDRE, Mat};
 
 /// e^{A t} of a block-diagonal A, computed block by block. Scaling and squaring of the whole matrix would
 /// scale for the largest block, and the slow blocks would lose digits.
@@ -74,8 +60,8 @@ fn halvings(transition: &StateTransition, t: f64) -> usize {
 
 fn quadrature_root(transition: &StateTransition, b: &Mat, t: f64) -> Mat {
     let (n, m) = b.shape();
-    let mut columns = Mat::zeros(n, NODES.len() * m);
-    for (k, (node, weight)) in NODES.iter().enumerate() {
+    let mut columns = Mat::zeros(n, GAUSS_LEGENDRE.len() * m);
+    for (k, (node, weight)) in GAUSS_LEGENDRE.iter().enumerate() {
         let column = transition.over(node * t) * b * (weight * t).sqrt();
         columns.columns_mut(k * m, m).copy_from(&column);
     }

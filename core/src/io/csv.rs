@@ -184,14 +184,14 @@ fn uneven(times: &[f64], lines: &[u64]) -> (u64, String) {
 }
 
 /// The value of a unit of the last digit of a decimal number: 0.001 for `2.125`, 1e-6 for `4.2e-5`.
-fn last_digit(number: &str) -> f64 {
+pub(super) fn last_digit(number: &str) -> f64 {
     let (mantissa, exponent) = number.split_once(['e', 'E']).unwrap_or((number, "0"));
     let decimals = mantissa.split_once('.').map_or(0, |(_, decimals)| decimals.len());
     10f64.powi(exponent.parse::<i32>().unwrap_or(0).saturating_sub(decimals as i32))
 }
 
 /// The unit in seconds of a heading that names the time.
-fn time_unit(heading: &str) -> Option<f64> {
+pub(super) fn time_unit(heading: &str) -> Option<f64> {
     let heading = heading.to_lowercase();
     let mut words = heading.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
     let first = words.next()?;

@@ -73,6 +73,7 @@ fn the_spline_is_the_conditional_mean_of_the_walk() {
             let x = first + (last - first) * f64::from(k) / 36.0;
             let (value, variance) = kriged(&samples, q, x.max(0.0));
             let found = spline.at(x.max(0.0));
+            assert_eq!(spline.value(x.max(0.0)), found.value);
             assert!((found.variance / variance - 1.0).abs() < 0.03, "{q} {x}: {found:?} {variance}");
             assert!((found.value - value).abs() < 0.03 * variance.sqrt(), "{q} {x}: {found:?} {value}");
         }
@@ -123,7 +124,7 @@ fn a_sample_that_contradicts_the_others_shows() {
         (0..60).map(|k| sample(f64::from(k), 0.1 * f64::from(k) + 0.2 * normal(&mut random), 0.2)).collect();
     let worst = |samples: &[Measured]| {
         let spline = SmoothingSpline::new(samples.to_vec(), 1e-6).unwrap();
-        let found: Vec<f64> = spline.contradictions().collect();
+        let found: Vec<f64> = spline.left_out().map(|out| out.miss / out.deviation).collect();
         let worst = (0..60).max_by(|a, b| found[*a].total_cmp(&found[*b])).unwrap();
         let mean_square = found.iter().map(|c| c * c).sum::<f64>() / 60.0;
         (worst, found[worst], mean_square)

@@ -103,7 +103,7 @@ fn waves(truth: &Spec, frequencies: &[Hertz], phases: &[f64], frames: usize) -> 
 }
 
 /// A Gaussian number of unit variance (Box and Muller, 1958).
-pub(super) fn gaussian(dice: &mut Random) -> f64 {
+pub(crate) fn gaussian(dice: &mut Random) -> f64 {
     (-2.0 * (1.0 - dice.part()).ln()).sqrt() * (TAU * dice.part()).cos()
 }
 

@@ -1,0 +1,177 @@
+//! The signal behind whole recordings, at instants of a regular grid.
+
+use super::demand::{self, LONGEST_BLOCK};
+use super::estimator::{Estimator, MeanSquare};
+use super::knots::{Stretch, mean};
+use super::recording::Recording;
+use hybank_core::units::FastPeriods;
+use hybank_linalg::LinalgError;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Frames of a block, for which one error is stated.
+const FRAMES_PER_BLOCK: usize = 64;
+/// Most blocks of a stretch, whose frames share the numbers of their samples.
+const MOST_BLOCKS: usize = 64;
+/// Periods by which the samples of a stretch may drift.
+const MOST_DRIFT: f64 = 1.0 / 16.0;
+/// Relative difference up to which clocks have nearly one rate.
+const SAME_RATE: f64 = 0.005;
+
+/// Times that samples around an output may lie farther apart than in the mean: stamps come unevenly.
+const SLACK: f64 = 1.5;
+
+/// What is wanted of recordings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FusionSettings {
+    /// The instant of the first output; the others follow, one in each fast period.
+    pub first: FastPeriods,
+    /// How many outputs.
+    pub count: usize,
+    /// Samples of each recording on either side of an output.
+    pub reach: usize,
+}
+
+impl FusionSettings {
+    /// The longest time that the covariances for [`fuse`] should know.
+    pub fn longest(&self, recordings: &[Recording]) -> FastPeriods {
+        let period = recordings.iter().map(Recording::mean_period).fold(0.0, f64::max);
+        FastPeriods(SLACK * 2.0 * (self.reach + 1) as f64 * period) + LONGEST_BLOCK
+    }
+}
+
+/// The signal behind recordings.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fused {
+    /// The outputs.
+    pub samples: Vec<f64>,
+    /// The mean of the errors of each block of outputs.
+    pub errors: Vec<MeanSquare>,
+    /// Outputs of a block; the last one may have less.
+    pub block: usize,
+}
+
+/// The outputs, in frames of as many as a recorder has fast periods in each of its own.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Grid {
+    first: FastPeriods,
+    pub(super) ratio: usize,
+}
+
+impl Grid {
+    /// The instant of the first output of a frame.
+    pub(super) fn frame(self, frame: usize) -> FastPeriods {
+        self.first + FastPeriods((frame * self.ratio) as f64)
+    }
+
+    /// The instants of the outputs of a frame, relative to it.
+    pub(super) fn phases(self) -> Vec<FastPeriods> {
+        (0..self.ratio).map(|p| FastPeriods(p as f64)).collect()
+    }
+
+    fn instants(self, frames: Range<usize>) -> Vec<FastPeriods> {
+        (frames.start * self.ratio..frames.end * self.ratio)
+            .map(|n| self.first + FastPeriods(n as f64))
+            .collect()
+    }
+}
+
+/// Outputs of a stretch, and the errors of its blocks.
+type Part = (Vec<f64>, Vec<MeanSquare>);
+
+/// Estimates the target at every output of a grid.
+///
+/// Recorders of nearly one rate, that of an integer number of fast periods, share taps over many frames. For
+/// all others, and around lost samples, the samples of each block are taken for themselves. An output depends
+/// on the instants of the samples around it and on nothing else, so it has the same bits for any number of
+/// threads. Samples farther away than half of the [longest](super::Signals::longest) time are left out.
+///
+/// # Errors
+/// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
+pub fn fuse(
+    estimator: &Estimator,
+    recordings: &[Recording],
+    settings: FusionSettings,
+) -> Result<Fused, LinalgError> {
+    let FusionSettings { first, count, reach } = settings;
+    let longest = estimator.signals().longest();
+    let common = common_ratio(recordings).filter(|ratio| ((2 * reach + 2) * ratio) as f64 <= longest.0);
+    let grid = Grid { first, ratio: common.unwrap_or(1) };
+    let frames = count.div_ceil(grid.ratio);
+    let length = FRAMES_PER_BLOCK * common.map_or(1, |ratio| blocks_of_stretch(recordings, ratio));
+    let stretch = |number: usize| {
+        let frames = number * length..frames.min((number + 1) * length);
+        match common {
+            Some(_) => on_knots(estimator, recordings, grid, reach, frames),
+            None => on_demand(estimator, recordings, grid, reach, frames),
+        }
+    };
+    let parts: Vec<Part> =
+        (0..frames.div_ceil(length)).into_par_iter().map(stretch).collect::<Result<_, _>>()?;
+    let (mut samples, mut errors) = (Vec::with_capacity(frames * grid.ratio), Vec::new());
+    for (outputs, of_blocks) in parts {
+        samples.extend(outputs);
+        errors.extend(of_blocks);
+    }
+    samples.truncate(count);
+    Ok(Fused { samples, errors, block: FRAMES_PER_BLOCK * grid.ratio })
+}
+
+/// The fast periods in a period of all recordings, if that is one integer.
+fn common_ratio(recordings: &[Recording]) -> Option<usize> {
+    let (most, _) = recordings.first()?.clock().periods(recordings.first()?.samples().len());
+    let ratio = most.round();
+    let is_near = |recording: &Recording| {
+        let (most, least) = recording.clock().periods(recording.samples().len());
+        (most / ratio - 1.0).abs() < SAME_RATE && (least / ratio - 1.0).abs() < SAME_RATE
+    };
+    (ratio >= 1.0 && recordings.iter().all(is_near)).then_some(ratio as usize)
+}
+
+/// Blocks over which no clock drifts too far.
+fn blocks_of_stretch(recordings: &[Recording], ratio: usize) -> usize {
+    let drift = |recording: &Recording| {
+        let (most, least) = recording.clock().periods(recording.samples().len());
+        (most / ratio as f64 - 1.0).abs().max((least / ratio as f64 - 1.0).abs())
+    };
+    let fastest = recordings.iter().map(drift).fold(0.0, f64::max);
+    let blocks = (MOST_DRIFT / (fastest * FRAMES_PER_BLOCK as f64)) as usize;
+    1 << blocks.clamp(1, MOST_BLOCKS).ilog2()
+}
+
+fn on_knots(
+    estimator: &Estimator,
+    recordings: &[Recording],
+    grid: Grid,
+    reach: usize,
+    frames: Range<usize>,
+) -> Result<Part, LinalgError> {
+    let stretch = Stretch::new(estimator, recordings, grid, reach, frames.clone())?;
+    let (mut outputs, mut errors) = (Vec::with_capacity(frames.len() * grid.ratio), Vec::new());
+    for (frame, found) in stretch.frames() {
+        let error = match found {
+            Some(found) => {
+                outputs.extend(found.outputs);
+                found.error
+            }
+            None => {
+                let found = demand::block(estimator, recordings, reach, &grid.instants(frame..frame + 1))?;
+                outputs.extend(found.outputs);
+                found.error
+            }
+        };
+        errors.push(error);
+    }
+    Ok((outputs, errors.chunks(FRAMES_PER_BLOCK).map(mean).collect()))
+}
+
+fn on_demand(
+    estimator: &Estimator,
+    recordings: &[Recording],
+    grid: Grid,
+    reach: usize,
+    frames: Range<usize>,
+) -> Result<Part, LinalgError> {
+    let found = demand::block(estimator, recordings, reach, &grid.instants(frames))?;
+    Ok((found.outputs, vec![found.error]))
+}

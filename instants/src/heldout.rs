@@ -1,0 +1,81 @@
+//! How well samples are predicted from those around them: a trial of a model by the recordings themselves.
+
+use super::estimator::{Estimator, Sample};
+use super::recording::Recording;
+use hybank_core::units::FastPeriods;
+use hybank_linalg::{LinalgError, Mat, dot};
+use rayon::prelude::*;
+
+/// The least power of a signal over its mean power.
+const LEAST_LEVEL: f64 = 1e-6;
+
+/// A sample that was left out and estimated from the others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeldOut {
+    /// Of which converter.
+    pub converter: usize,
+    /// The sample less its estimate.
+    pub residual: f64,
+    /// The variance that the model states for the residual, for a signal of mean power 1 that has the power
+    /// of the samples around.
+    pub variance: f64,
+}
+
+/// Leaves out, at each of `instants`, the nearest sample of every recording in turn. `reach` samples of each
+/// recording on either side predict it. `power` is the mean power of the signal.
+///
+/// With the covariances C of all samples x around an instant, the residual of sample k is
+/// `[C^-1 x]_k / [C^-1]_kk` and its variance `1 / [C^-1]_kk` (Rasmussen and Williams, Gaussian Processes for
+/// Machine Learning, section 5.4.2).
+///
+/// # Errors
+/// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
+pub fn held_out(
+    estimator: &Estimator,
+    recordings: &[Recording],
+    reach: usize,
+    power: f64,
+    instants: &[FastPeriods],
+) -> Result<Vec<HeldOut>, LinalgError> {
+    let around = |instant: &FastPeriods| around(estimator, recordings, reach, power, *instant);
+    let parts: Vec<Vec<HeldOut>> = instants.par_iter().map(around).collect::<Result<_, _>>()?;
+    Ok(parts.concat())
+}
+
+fn around(
+    estimator: &Estimator,
+    recordings: &[Recording],
+    reach: usize,
+    power: f64,
+    origin: FastPeriods,
+) -> Result<Vec<HeldOut>, LinalgError> {
+    let within = estimator.signals().longest() * 0.5;
+    let (mut samples, mut values, mut nearest) = (Vec::new(), Vec::new(), Vec::new());
+    for recording in recordings {
+        let numbers = recording.around(origin..origin, reach, within);
+        let place = numbers.iter().position(|number| *number as i64 == recording.nearest(origin));
+        nearest.extend(place.map(|place| samples.len() + place));
+        samples.extend(numbers.iter().map(|&number| {
+            let sample = recording.sample(number as i64);
+            Sample { instant: sample.instant - origin, ..sample }
+        }));
+        values.extend(numbers.iter().map(|&number| recording.samples()[number]));
+    }
+    // Sounds come and go, noise stays.
+    let gain = |sample: &Sample| estimator.signals().converters()[sample.converter].gain;
+    let squares = samples.iter().zip(&values).map(|(sample, value)| (value / gain(sample)).powi(2));
+    let level = squares.sum::<f64>() / (values.len().max(1) as f64 * power);
+    let level = level.max(LEAST_LEVEL);
+    let unit =
+        Mat::from_fn(samples.len(), nearest.len(), |k, column| f64::from(u8::from(nearest[column] == k)));
+    let columns = estimator.set(&samples).at_level(level).factor()?.solve(&unit);
+    let found = |(column, &k): (usize, &usize)| {
+        let of_inverse = &columns.as_slice()[column * samples.len()..(column + 1) * samples.len()];
+        HeldOut {
+            converter: samples[k].converter,
+            residual: dot(of_inverse, &values) / of_inverse[k],
+            variance: level / of_inverse[k],
+        }
+    };
+    Ok(nearest.iter().enumerate().map(found).collect())
+}

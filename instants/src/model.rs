@@ -1,0 +1,240 @@
+//! The model of recordings that states nothing: spectrum and noise, from the recordings themselves.
+
+use super::estimator::{Estimator, MeanSquare, Sample};
+use super::fusion::{FusionSettings, fuse};
+use super::heldout::{HeldOut, held_out};
+use super::knots::mean;
+use super::learned::learned;
+use super::recording::Recording;
+use super::signals::{Converter, Signals};
+use super::spectrum::Spectrum;
+use hybank_core::units::{CyclesPerFastPeriod, FastPeriods};
+use hybank_linalg::{Complex, LinalgError, Mat};
+
+/// Parts of the run from which the spectrum is learned, and outputs of each.
+const PARTS: usize = 128;
+const OUTPUTS_OF_PART: usize = 2048;
+/// Instants at which samples are left out, to measure the noise.
+const TRIALS: usize = 64;
+/// The noise of the first pass, over the power of the signal: as of recorders with 50 dB.
+const FIRST_NOISE: f64 = 1e-5;
+/// By what the variance of the noise changes from trial to trial, coarse to fine: 10, 3 and 1 dB.
+const FACTORS: [f64; 3] = [10.0, 1.995_262_314_968_879_6, 1.258_925_411_794_167_2];
+
+/// A signal with its recorders, whose front ends are equal and flat.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// S.
+    pub spectrum: Spectrum,
+    /// The power of the signal.
+    pub power: f64,
+    /// Variance of the noise of each recording.
+    pub noise: Vec<f64>,
+    /// For samples of these recordings; its signal has the power 1.
+    pub estimator: Estimator,
+}
+
+/// What is known of recordings before they are looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prior {
+    /// The frequencies of the signal; all up to half of the output's rate, if `None`.
+    pub band: Option<CyclesPerFastPeriod>,
+    /// How often the spectrum is learned from the result; 0 keeps it flat over the band.
+    pub passes: usize,
+    /// The gain of each recording.
+    pub gains: Vec<f64>,
+    /// The least variance of the noise of each recording: of its rounding.
+    pub least_noise: Vec<f64>,
+}
+
+impl Model {
+    /// The model of `recordings`, which the converters 0, 1, .. made in their order.
+    ///
+    /// A first estimate with a flat spectrum shows the spectrum (Welch), over the half of the run where the
+    /// predicted error is least: elsewhere what is not resolved would be taken for signal. The noise of each
+    /// recording is that with which samples that are left out are predicted best, by their likelihood.
+    ///
+    /// # Errors
+    /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
+    pub fn learn(
+        recordings: &[Recording],
+        prior: &Prior,
+        settings: FusionSettings,
+    ) -> Result<Self, LinalgError> {
+        let longest = settings.longest(recordings);
+        let highest = prior.band.unwrap_or(CyclesPerFastPeriod(0.5));
+        let spectrum = Spectrum::flat(CyclesPerFastPeriod(0.0)..highest, longest);
+        let power = mean_power(recordings, &prior.gains);
+        let noise = prior.gains.iter().zip(&prior.least_noise);
+        let noise = noise.map(|(gain, least)| least.max(FIRST_NOISE * power * gain * gain)).collect();
+        let mut model = Self::new(spectrum, power, noise, &prior.gains);
+        model.measure_noise(recordings, prior, settings)?;
+        for _ in 0..prior.passes {
+            let Some((spectrum, power)) = model.relearned(recordings, settings, longest)? else { break };
+            model = Self::new(spectrum, power, model.noise, &prior.gains);
+            model.measure_noise(recordings, prior, settings)?;
+        }
+        Ok(model)
+    }
+
+    fn new(spectrum: Spectrum, power: f64, noise: Vec<f64>, gains: &[f64]) -> Self {
+        let converter = |(gain, noise): (&f64, &f64)| Converter::exact(0, *gain, noise / power);
+        let converters = gains.iter().zip(&noise).map(converter).collect();
+        let signals = Signals::new(&spectrum, &[&|_| Complex::from(1.0)], 0, converters);
+        Self { spectrum, power, noise, estimator: Estimator::new(signals) }
+    }
+
+    /// Spectrum and power of the estimate by this model; `None` if there is too little of it, or silence.
+    fn relearned(
+        &self,
+        recordings: &[Recording],
+        settings: FusionSettings,
+        longest: FastPeriods,
+    ) -> Result<Option<(Spectrum, f64)>, LinalgError> {
+        let count = settings.count.min(OUTPUTS_OF_PART);
+        let room = settings.count - count;
+        let parts = PARTS.min(room / count + 1);
+        let first = |part: usize| room * part / (parts - 1).max(1);
+        let part = |number: usize| {
+            let first = settings.first + FastPeriods(first(number) as f64);
+            fuse(&self.estimator, recordings, FusionSettings { first, count, ..settings })
+        };
+        let all = (0..parts).map(part).collect::<Result<Vec<_>, _>>()?;
+        let mut errors: Vec<f64> = all.iter().map(|fused| mean(&fused.errors).total()).collect();
+        let good = errors.clone();
+        errors.sort_by(f64::total_cmp);
+        let median = errors[parts / 2];
+        let chosen =
+            all.iter().zip(good).filter(|(_, error)| *error <= median).map(|(fused, _)| &fused.samples);
+        let signal: Vec<f64> = chosen.flatten().copied().collect();
+        let ranges: Vec<_> = (0..signal.len() / count).map(|k| k * count..(k + 1) * count).collect();
+        Ok(learned(&signal, &ranges, longest))
+    }
+
+    fn measure_noise(
+        &mut self,
+        recordings: &[Recording],
+        prior: &Prior,
+        settings: FusionSettings,
+    ) -> Result<(), LinalgError> {
+        let instants = instants(settings, TRIALS);
+        (0..recordings.len())
+            .try_for_each(|i| self.measure_noise_of(i, recordings, prior, settings.reach, &instants))
+    }
+
+    /// In steps of a decade first, and then finer.
+    fn measure_noise_of(
+        &mut self,
+        i: usize,
+        recordings: &[Recording],
+        prior: &Prior,
+        reach: usize,
+        instants: &[FastPeriods],
+    ) -> Result<(), LinalgError> {
+        let (least, most) = (prior.least_noise[i], self.power * prior.gains[i].powi(2));
+        let mut noise: Vec<f64> = self.noise.iter().map(|noise| noise / self.power).collect();
+        let mut misfit = |candidate: f64| -> Result<f64, LinalgError> {
+            noise[i] = candidate / self.power;
+            let estimator = Estimator::new(self.estimator.signals().with_noise(&noise));
+            Ok(misfit(&held_out(&estimator, recordings, reach, self.power, instants)?, self.power))
+        };
+        let mut best = self.noise[i].clamp(least, most.max(least));
+        let mut least_misfit = misfit(best)?;
+        for factor in FACTORS {
+            for step in [factor, 1.0 / factor] {
+                loop {
+                    let candidate = (best * step).clamp(least, most.max(least));
+                    let found = if candidate == best { f64::INFINITY } else { misfit(candidate)? };
+                    if !(found < least_misfit) {
+                        break;
+                    }
+                    (best, least_misfit) = (candidate, found);
+                }
+            }
+        }
+        self.noise[i] = best;
+        let noise: Vec<f64> = self.noise.iter().map(|noise| noise / self.power).collect();
+        self.estimator = Estimator::new(self.estimator.signals().with_noise(&noise));
+        Ok(())
+    }
+}
+
+/// `sum ln s^2 + e^2 / s^2` over the residuals e with their variances s^2: minus twice their log-likelihood.
+fn misfit(found: &[HeldOut], power: f64) -> f64 {
+    let of = |one: &HeldOut| {
+        let variance = one.variance * power;
+        variance.ln() + one.residual.powi(2) / variance
+    };
+    found.iter().map(of).sum()
+}
+
+/// Instants over the whole run that meet no pattern: multiples of the golden ratio.
+fn instants(settings: FusionSettings, count: usize) -> Vec<FastPeriods> {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let at = |k: usize| settings.first + FastPeriods(settings.count as f64 * (k as f64 * golden).fract());
+    (0..count).map(at).collect()
+}
+
+/// Of all samples, over the squares of their gains.
+fn mean_power(recordings: &[Recording], gains: &[f64]) -> f64 {
+    let power = |(recording, gain): (&Recording, &f64)| {
+        let there = recording.samples().iter().filter(|x| x.is_finite());
+        let (sum, count) = there.fold((0.0, 0_usize), |(sum, count), x| (sum + x * x, count + 1));
+        sum / (count.max(1) as f64 * gain * gain)
+    };
+    let powers = recordings.iter().zip(gains).map(power);
+    powers.sum::<f64>() / recordings.len() as f64
+}
+
+/// What the ways to use recordings give, in the mean over a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ways {
+    /// All samples.
+    pub together: MeanSquare,
+    /// Those of one recording, by its number.
+    pub alone: Vec<MeanSquare>,
+    /// The mean of what each recording gives alone.
+    pub mean: MeanSquare,
+}
+
+impl Model {
+    /// What all samples give, those of each recording alone, and the mean of these.
+    ///
+    /// # Errors
+    /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
+    pub fn ways(&self, recordings: &[Recording], settings: FusionSettings) -> Result<Ways, LinalgError> {
+        let at = |instant: &FastPeriods| self.ways_at(recordings, settings.reach, *instant);
+        let all = instants(settings, TRIALS).iter().map(at).collect::<Result<Vec<_>, _>>()?;
+        let of = |way: usize| mean(&all.iter().map(|errors| errors[way]).collect::<Vec<_>>());
+        let count = recordings.len();
+        Ok(Ways { together: of(0), alone: (1..=count).map(of).collect(), mean: of(count + 1) })
+    }
+
+    /// The errors of all together, of each recording alone, and of their mean.
+    fn ways_at(
+        &self,
+        recordings: &[Recording],
+        reach: usize,
+        instant: FastPeriods,
+    ) -> Result<Vec<MeanSquare>, LinalgError> {
+        let within = self.estimator.signals().longest() * 0.5;
+        let of = |recording: &Recording| -> Vec<Sample> {
+            let numbers = recording.around(instant..instant, reach, within).into_iter();
+            numbers.map(|number| recording.sample(number as i64)).collect()
+        };
+        let sets: Vec<Vec<Sample>> = recordings.iter().map(of).collect();
+        let (all, count) = (sets.concat(), sets.len());
+        let set = self.estimator.set(&all);
+        let with_target = set.with_target(&[instant]);
+        let mut weights = Mat::zeros(all.len(), count + 2);
+        weights.column_mut(0).copy_from(&set.taps(&with_target)?.weights.column(0));
+        let mut row = 0;
+        for (i, own) in sets.iter().enumerate() {
+            let taps = self.estimator.taps(own, &[instant])?.weights;
+            weights.view_mut((row, i + 1), (own.len(), 1)).copy_from(&taps);
+            weights.view_mut((row, count + 1), (own.len(), 1)).copy_from(&(taps / count as f64));
+            row += own.len();
+        }
+        Ok(set.errors(&weights, &Mat::from_fn(all.len(), count + 2, |k, _| with_target[k])))
+    }
+}

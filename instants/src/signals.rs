@@ -1,0 +1,186 @@
+//! What converters make of a signal.
+
+use super::covariance::{Covariance, Term};
+use super::spectrum::Spectrum;
+use hybank_core::units::{CyclesPerFastPeriod, FastPeriods};
+use hybank_linalg::Complex;
+use std::f64::consts::TAU;
+
+/// Least variance of the noise of a sample, relative to the sample's power: below it covariances have no
+/// digits that tell samples apart.
+const LEAST_NOISE: f64 = 1e-12;
+
+/// A converter behind one of the front ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Converter {
+    /// Number of its front end.
+    pub front_end: usize,
+    /// The sample over the output of the front end; negative for an inverted converter.
+    pub gain: f64,
+    /// Variance of its white noise, for a signal of power 1.
+    pub noise: f64,
+    /// Standard deviation of an error of all its instants.
+    pub delay_deviation: FastPeriods,
+    /// Standard deviation of its gain, relative to the gain.
+    pub gain_deviation: f64,
+}
+
+impl Converter {
+    /// A converter whose instants and gain are exact.
+    pub fn exact(front_end: usize, gain: f64, noise: f64) -> Self {
+        Self { front_end, gain, noise, delay_deviation: FastPeriods(0.0), gain_deviation: 0.0 }
+    }
+}
+
+/// The covariances of all samples and of the target.
+///
+/// The samples of one converter share the error of its instants, so it leaves their covariances among one
+/// another as they are. Those of different converters are multiplied, in the spectrum, by the characteristic
+/// functions of both errors, those with the target by that of one.
+#[derive(Debug, Clone)]
+pub struct Signals {
+    converters: Vec<Converter>,
+    /// Number of the behaviour of each converter.
+    behaviours: Vec<usize>,
+    /// Of two samples of one converter, by behaviour, for a gain of 1.
+    own: Vec<Covariance>,
+    /// Of a sample of one behaviour and a sample of another converter: c(t) for the first t later. By pairs
+    /// (a, b) with b <= a, at a (a + 1) / 2 + b.
+    cross: Vec<Covariance>,
+    /// Of a sample of each behaviour and the target: c(t) for the sample t later.
+    with_target: Vec<Covariance>,
+    /// P_0.
+    target_power: f64,
+    longest: FastPeriods,
+}
+
+/// What distinguishes the covariances of converters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Behaviour {
+    front_end: usize,
+    deviation: f64,
+}
+
+impl Signals {
+    /// Of `converters` whose front ends have these responses, and the target among them.
+    pub fn new(
+        spectrum: &Spectrum,
+        front_ends: &[&dyn Fn(CyclesPerFastPeriod) -> Complex<f64>],
+        target: usize,
+        converters: Vec<Converter>,
+    ) -> Self {
+        let mut kinds: Vec<Behaviour> = Vec::new();
+        let of = |converter: &Converter| Behaviour {
+            front_end: converter.front_end,
+            deviation: converter.delay_deviation.0,
+        };
+        let behaviours = converters.iter().map(|converter| number_of(&mut kinds, of(converter))).collect();
+        let nodes = Nodes::new(spectrum, front_ends);
+        let exact = |front_end: usize| Behaviour { front_end, deviation: 0.0 };
+        let own: Vec<Covariance> =
+            kinds.iter().map(|kind| nodes.covariance(exact(kind.front_end), exact(kind.front_end))).collect();
+        let pairs =
+            kinds.iter().enumerate().flat_map(|(a, one)| kinds[..=a].iter().map(move |two| (one, two)));
+        let cross = pairs.map(|(one, two)| nodes.covariance(*one, *two)).collect();
+        let with_target = kinds.iter().map(|kind| nodes.covariance(*kind, exact(target))).collect();
+        let target_power = nodes.covariance(exact(target), exact(target)).at(0.0);
+        let mut signals = Self {
+            converters,
+            behaviours,
+            own,
+            cross,
+            with_target,
+            target_power,
+            longest: spectrum.longest(),
+        };
+        signals.raise_noise();
+        signals
+    }
+
+    fn raise_noise(&mut self) {
+        for (converter, &behaviour) in self.converters.iter_mut().zip(&self.behaviours) {
+            let power = converter.gain.powi(2) * self.own[behaviour].at(0.0);
+            converter.noise = converter.noise.max(LEAST_NOISE * power);
+        }
+    }
+
+    /// The same with other variances of the noise, one for each converter.
+    #[must_use]
+    pub fn with_noise(&self, variances: &[f64]) -> Self {
+        let mut signals = self.clone();
+        signals.converters.iter_mut().zip(variances).for_each(|(converter, noise)| converter.noise = *noise);
+        signals.raise_noise();
+        signals
+    }
+
+    /// Variance of the noise of a converter.
+    pub(super) fn noise_of(&self, converter: usize) -> f64 {
+        self.converters[converter].noise
+    }
+
+    /// The converters, with at least the noise that covariances resolve.
+    pub fn converters(&self) -> &[Converter] {
+        &self.converters
+    }
+
+    /// P_0, the power of the target.
+    pub fn target_power(&self) -> f64 {
+        self.target_power
+    }
+
+    /// The longest time between two instants that the covariances know.
+    pub fn longest(&self) -> FastPeriods {
+        self.longest
+    }
+
+    /// The covariance of a sample of converter `i` and one of converter `k` taken `later` before it, without
+    /// noise.
+    pub(super) fn of_samples(&self, i: usize, k: usize, later: f64) -> f64 {
+        let gains = self.converters[i].gain * self.converters[k].gain;
+        let (a, b) = (self.behaviours[i], self.behaviours[k]);
+        if i == k {
+            return gains * (1.0 + self.converters[i].gain_deviation.powi(2)) * self.own[a].at(later);
+        }
+        let number = |a: usize, b: usize| a * (a + 1) / 2 + b;
+        gains * if b <= a { self.cross[number(a, b)].at(later) } else { self.cross[number(b, a)].at(-later) }
+    }
+
+    /// The covariance of a sample of converter `i` and the target at an instant `later` before it.
+    pub(super) fn of_target(&self, i: usize, later: f64) -> f64 {
+        self.converters[i].gain * self.with_target[self.behaviours[i]].at(later)
+    }
+}
+
+fn number_of(kinds: &mut Vec<Behaviour>, kind: Behaviour) -> usize {
+    kinds.iter().position(|known| *known == kind).unwrap_or_else(|| {
+        kinds.push(kind);
+        kinds.len() - 1
+    })
+}
+
+/// The spectrum with the responses of all front ends at its nodes.
+struct Nodes<'a> {
+    spectrum: &'a Spectrum,
+    responses: Vec<Vec<Complex<f64>>>,
+}
+
+impl<'a> Nodes<'a> {
+    fn new(spectrum: &'a Spectrum, front_ends: &[&dyn Fn(CyclesPerFastPeriod) -> Complex<f64>]) -> Self {
+        let response = |front_end: &&dyn Fn(CyclesPerFastPeriod) -> Complex<f64>| {
+            spectrum.nodes().iter().map(|node| front_end(node.frequency)).collect()
+        };
+        Self { spectrum, responses: front_ends.iter().map(response).collect() }
+    }
+
+    /// Of the outputs of two front ends, the first at the later instant.
+    fn covariance(&self, one: Behaviour, two: Behaviour) -> Covariance {
+        let variance = one.deviation.powi(2) + two.deviation.powi(2);
+        let term = |(q, node): (usize, &super::Node)| {
+            let characteristic = (-0.5 * (TAU * node.frequency.0).powi(2) * variance).exp();
+            let product = self.responses[one.front_end][q] * self.responses[two.front_end][q].conj();
+            Term { frequency: node.frequency.0, amplitude: product * (node.power * characteristic) }
+        };
+        let terms: Vec<Term> = self.spectrum.nodes().iter().enumerate().map(term).collect();
+        Covariance::new(&terms, self.spectrum.longest().0)
+    }
+}

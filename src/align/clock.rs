@@ -1,0 +1,328 @@
+//! When the samples of a recording were taken, on the clock of the reference.
+
+use super::path::usual;
+use crate::sampling::nonuniform::Measured;
+use crate::sampling::{LeftOut, SmoothingSpline};
+use crate::sine_fit::Estimate;
+use serde::Serialize;
+use std::ops::Range;
+
+/// Readings beyond this many standard deviations of what the others say are refused.
+const GATE_SIGMAS: f64 = 5.0;
+/// Rounds in which readings are refused, those that contradict the others most in each.
+const ROUNDS: usize = 12;
+/// Readings on each side of the worst one that are judged again without it.
+const BESIDE: usize = 4;
+
+/// Misfits on each side that say how far a reading scatters: sounds change after some pieces.
+const WEIGHED_BY: usize = 6;
+/// Readings without any noise scatter by this share of their deviations.
+const LEAST_SCALE: f64 = 1e-3;
+/// A sum of negative logarithms that is larger than the least by this may be the right one: half the 95 %
+/// point of chi-square with one degree of freedom.
+const LIKELY_SURPRISE: f64 = 1.92;
+/// Powers of ten of the variance by which a rate may walk per sample. That of 1 ppm in a second is 2e-17 at
+/// 48 kHz.
+const WALKS: std::ops::RangeInclusive<i32> = -26..=-9;
+/// A misfit counts as at most so many of the usual ones: a reading may be wrong altogether, and is refused
+/// later.
+const MOST_MISFIT: f64 = 3.0;
+/// Rounds in which the sample of an instant is found.
+const INVERSE_ROUNDS: usize = 5;
+
+/// What one piece says of a clock. Samples are those of the recording with its steps mended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ClockReading {
+    /// Number of the piece.
+    pub(super) piece: usize,
+    /// Sample of the recording.
+    pub(super) sample: f64,
+    /// The sample minus its instant, in samples of the reference.
+    pub(super) lag: f64,
+    /// Standard deviation of the lag.
+    pub(super) deviation: f64,
+}
+
+/// A place where a recording lacks samples, or has some that the reference has not.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Step {
+    /// Samples of the recording, as given, among which it lies: what they hold belongs to neither side.
+    pub samples: Range<usize>,
+    /// Samples that are lost; below 0 those that are too many.
+    pub lost: i64,
+}
+
+/// When the samples of a recording were taken: a smooth course with steps where samples were lost.
+///
+/// Samples count from the first one of the recording as it was given, instants in samples of the recording
+/// of the reference, from its first one. Both may be fractions, and beyond the readings the course goes on
+/// as a line.
+#[derive(Debug, Clone)]
+pub struct ClockCourse {
+    /// The lag over the samples with the steps mended. None for the reference.
+    smooth: Option<Smooth>,
+    /// By their samples.
+    steps: Vec<Step>,
+    /// Those that were not refused, by their pieces.
+    readings: Vec<ClockReading>,
+}
+
+impl ClockCourse {
+    /// Of the reference itself.
+    pub(super) fn reference() -> Self {
+        Self { smooth: None, steps: Vec::new(), readings: Vec::new() }
+    }
+
+    /// Through readings of a recording with these steps. `None` if no spline goes through them, and with
+    /// those of fewer than two samples.
+    pub(super) fn new(mut readings: Vec<ClockReading>, steps: Vec<Step>) -> Option<Self> {
+        let has_two_samples = readings.iter().any(|reading| reading.sample != readings[0].sample);
+        if !has_two_samples {
+            return None;
+        }
+        weigh(&mut readings);
+        for _ in 0..ROUNDS {
+            let worst = contradictory(&Smooth::new(&readings)?.spline);
+            // Without two samples nothing is left to be judged by.
+            if worst.is_empty() || readings.len() < worst.len() + 2 {
+                break;
+            }
+            for k in worst.into_iter().rev() {
+                readings.remove(k);
+            }
+        }
+        let smooth = Smooth::new(&readings)?;
+        readings.iter_mut().for_each(|reading| reading.deviation *= smooth.scale);
+        Some(Self { smooth: Some(smooth), steps, readings })
+    }
+
+    /// The instant of a sample, in samples of the reference.
+    pub fn at(&self, sample: f64) -> f64 {
+        let mended = self.mended(sample);
+        mended - self.lag(mended)
+    }
+
+    /// Standard deviation of the instant of a sample, in samples of the reference.
+    pub fn deviation(&self, sample: f64) -> f64 {
+        self.known(self.mended(sample)).sigma
+    }
+
+    /// Where samples were lost or came in.
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// The number of a sample had none been lost before it.
+    fn mended(&self, sample: f64) -> f64 {
+        let before = self.steps.iter().take_while(|step| step.samples.end as f64 <= sample);
+        sample + before.map(|step| step.lost as f64).sum::<f64>()
+    }
+
+    /// By how much a sample of the mended recording is larger than its instant.
+    pub(super) fn lag(&self, mended: f64) -> f64 {
+        self.smooth.as_ref().map_or(0.0, |smooth| smooth.spline.value(mended))
+    }
+
+    /// The same with its deviation.
+    pub(super) fn known(&self, mended: f64) -> Estimate<f64> {
+        let Some(Smooth { spline, scale }) = &self.smooth else { return Estimate { value: 0.0, sigma: 0.0 } };
+        let known = spline.at(mended);
+        Estimate { value: known.value, sigma: scale * known.variance.sqrt() }
+    }
+
+    /// The sample of the mended recording that was taken at an instant.
+    pub(super) fn sample_at(&self, instant: f64) -> f64 {
+        // Clocks differ so little that each round gains three digits.
+        (0..INVERSE_ROUNDS).fold(instant, |sample, _| instant + self.lag(sample))
+    }
+
+    /// By how much the clock is fast: the slope of the line that is closest to the lags. Their first and
+    /// last ones alone would say it with the errors of few pieces. The deviation is that of the scatter
+    /// around the line.
+    pub(super) fn drift(&self) -> Estimate<f64> {
+        let weight = |reading: &ClockReading| reading.deviation.powi(-2);
+        let sum = |of: &dyn Fn(&ClockReading) -> f64| -> f64 {
+            self.readings.iter().map(|reading| weight(reading) * of(reading)).sum()
+        };
+        let weights = sum(&|_| 1.0);
+        let (middle, mean) = (sum(&|one| one.sample) / weights, sum(&|one| one.lag) / weights);
+        let squares = sum(&|one| (one.sample - middle).powi(2));
+        let slope = sum(&|one| (one.sample - middle) * (one.lag - mean)) / squares;
+        let misfit = sum(&|one| (one.lag - mean - slope * (one.sample - middle)).powi(2));
+        let freedom = self.readings.len().saturating_sub(2).max(1) as f64;
+        let scatter = (misfit / freedom * of_few(freedom) / squares).sqrt();
+        // From samples of the recording to those of the reference.
+        Estimate { value: slope / (1.0 - slope), sigma: scatter }
+    }
+
+    /// The reading of a piece, unless it has none or that was refused.
+    pub(super) fn reading(&self, piece: usize) -> Option<&ClockReading> {
+        self.readings.binary_search_by_key(&piece, |reading| reading.piece).ok().map(|k| &self.readings[k])
+    }
+}
+
+/// A spline through readings whose deviations are right up to a factor.
+#[derive(Debug, Clone)]
+struct Smooth {
+    spline: SmoothingSpline,
+    /// The factor.
+    scale: f64,
+}
+
+impl Smooth {
+    /// The smoothest spline whose readings are predicted by the others as well as by any (leave-one-out
+    /// predictive density; S. Geisser, *The predictive sample reuse method*, J. Am. Stat. Assoc. 70, 1975).
+    fn new(readings: &[ClockReading]) -> Option<Self> {
+        let measured = |reading: &ClockReading| Measured {
+            x: reading.sample,
+            value: reading.lag,
+            error: reading.deviation,
+            jitter: 0.0,
+        };
+        let all: Vec<Measured> = readings.iter().map(measured).collect();
+        let walks = std::iter::once(0.0).chain(WALKS.map(|exponent| 10f64.powi(exponent)));
+        let splines = walks.filter_map(|walk| SmoothingSpline::new(all.clone(), walk).ok());
+        let judged: Vec<(Judged, SmoothingSpline)> =
+            splines.map(|spline| (Judged::new(&spline), spline)).collect();
+        let least = judged.iter().map(|(judged, _)| judged.surprise).fold(f64::INFINITY, f64::min);
+        let is_good = |(judged, _): &(Judged, SmoothingSpline)| judged.surprise <= least + LIKELY_SURPRISE;
+        let (judged, spline) = judged.into_iter().find(is_good)?;
+        let freedom = readings.len().saturating_sub(2).max(1) as f64;
+        Some(Self { spline, scale: judged.scale * of_few(freedom).sqrt() })
+    }
+}
+
+/// How well each reading is predicted by the others.
+struct Judged {
+    /// Root mean square of what readings miss the others by, over the stated deviations.
+    scale: f64,
+    /// Sum of the negative logarithms of the predictive densities.
+    surprise: f64,
+}
+
+impl Judged {
+    fn new(spline: &SmoothingSpline) -> Self {
+        let all: Vec<LeftOut> = spline.left_out().collect();
+        let ratios = || all.iter().map(|out| out.miss / out.deviation);
+        let most = MOST_MISFIT * usual(ratios().collect());
+        let count = all.len() as f64;
+        let scale = (ratios().map(|ratio| ratio.min(most).powi(2)).sum::<f64>() / count).sqrt();
+        let scale = scale.max(LEAST_SCALE);
+        let deviations = all.iter().map(|out| out.deviation.ln()).sum::<f64>();
+        Self { scale, surprise: deviations + count * scale.ln() }
+    }
+}
+
+/// Square of the factor by which a deviation that was measured with so many degrees of freedom is short of
+/// that whose 95 % interval is that of the normal law: Student's law, within 3 %.
+pub(super) fn of_few(freedom: f64) -> f64 {
+    (1.0 + 1.2 / freedom + 2.4 / (freedom * freedom)).powi(2)
+}
+
+/// The samples that contradict the others, each the worst of those beside it.
+fn contradictory(spline: &SmoothingSpline) -> Vec<usize> {
+    let found: Vec<f64> = spline.left_out().map(|out| out.miss / out.deviation).collect();
+    let gate = GATE_SIGMAS * usual(found.clone());
+    let is_worst = |k: &usize| {
+        let beside = k.saturating_sub(BESIDE)..(k + BESIDE + 1).min(found.len());
+        found[*k] > gate && beside.into_iter().all(|j| j == *k || found[j] < found[*k])
+    };
+    (0..found.len()).filter(is_worst).collect()
+}
+
+/// Weighs readings by what those beside each scatter. Deviations of pieces are those of the Cramer-Rao
+/// bound, which pieces of little or narrow sound miss by up to twice, while the others reach it.
+///
+/// Misfits are second differences in their stated deviations; overlapping ones are correlated by -2/3 and
+/// 1/6. The variance of a reading relative to the stated one has the scaled inverse chi-square law whose
+/// prior, of two degrees of freedom, is the usual one, and whose data are the misfits.
+fn weigh(readings: &mut [ClockReading]) {
+    let misfit = |three: &[ClockReading]| {
+        let [before, own, after] = [three[0], three[1], three[2]];
+        let share = (own.sample - before.sample) / (after.sample - before.sample);
+        let miss = own.lag - (1.0 - share) * before.lag - share * after.lag;
+        let deviation = own.deviation.hypot((1.0 - share) * before.deviation);
+        miss.abs() / deviation.hypot(share * after.deviation)
+    };
+    let misfits: Vec<f64> = readings.windows(3).map(misfit).collect();
+    let usual = usual(misfits.clone()).max(LEAST_SCALE);
+    let factor = |number: usize| {
+        // The misfit of a reading is one before it, because the first reading has none.
+        let beside = number.saturating_sub(WEIGHED_BY + 1)..(number + WEIGHED_BY).min(misfits.len());
+        let freedom = beside.len() as f64 / (1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0));
+        let square = |misfit: &f64| misfit.min(MOST_MISFIT * usual).powi(2);
+        let mean = misfits[beside.clone()].iter().map(square).sum::<f64>() / beside.len().max(1) as f64;
+        ((freedom * mean + 2.0 * usual * usual) / (freedom + 2.0)).sqrt()
+    };
+    readings.iter_mut().enumerate().for_each(|(number, reading)| reading.deviation *= factor(number));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    /// Readings every `step` samples of a lag.
+    fn readings(count: usize, step: usize, deviation: f64, lag: impl Fn(f64) -> f64) -> Vec<ClockReading> {
+        let mut random = Random(21);
+        let mut normal = || (0..12).map(|_| random.part()).sum::<f64>() - 6.0;
+        let reading = |piece| {
+            let sample = (piece * step) as f64;
+            ClockReading { piece, sample, lag: lag(sample) + deviation * normal(), deviation }
+        };
+        (0..count).map(reading).collect()
+    }
+
+    /// A rate that changes by 2 ppm in a thousand samples: the lags err as the course states.
+    #[test]
+    fn the_stated_error_is_that_of_the_lags() {
+        let lag = |k: f64| 10.0 + 3e-6 * k + 5e-4 * (2e-3 * k).sin();
+        let all = readings(400, 20, 2e-5, lag);
+        let course = ClockCourse::new(all.clone(), Vec::new()).unwrap();
+        let (mut smoothed, mut stated) = (0.0, 0.0);
+        for reading in &all[60..340] {
+            let k = reading.sample;
+            smoothed += (course.at(k) - k + lag(k)).powi(2);
+            stated += course.deviation(k).powi(2);
+        }
+        let ratio = f64::sqrt(smoothed / stated);
+        assert!((0.6..1.5).contains(&ratio) && smoothed < 280.0 * 0.25 * 4e-10, "{ratio} {smoothed:e}");
+    }
+
+    #[test]
+    fn false_readings_are_refused() {
+        let mut all = readings(200, 20, 2e-5, |k| 10.0 + 3e-6 * k);
+        for k in [3, 77, 78, 150] {
+            all[k].lag += 1e-3;
+        }
+        let course = ClockCourse::new(all, Vec::new()).unwrap();
+        let refused: Vec<usize> = (0..200).filter(|piece| course.reading(*piece).is_none()).collect();
+        assert_eq!(refused, [3, 77, 78, 150]);
+        let miss = course.at(1550.0) - (1540.0 - 3e-6 * 1550.0);
+        assert!(miss.abs() < 4.0 * course.deviation(1550.0), "{miss:e}");
+    }
+
+    #[test]
+    fn one_reading_has_no_course() {
+        let all = readings(5, 20, 1e-8, |k| k);
+        assert!(ClockCourse::new(all[..1].to_vec(), Vec::new()).is_none());
+    }
+
+    /// Nor has a reading whose interval is no number.
+    #[test]
+    fn readings_without_numbers_have_no_course() {
+        let mut all = readings(5, 20, 1e-8, |k| k);
+        all[2].deviation = f64::NAN;
+        assert!(ClockCourse::new(all, Vec::new()).is_none());
+    }
+
+    #[test]
+    fn lost_samples_are_steps_of_the_course() {
+        let steps = vec![Step { samples: 30..32, lost: 7 }, Step { samples: 60..60, lost: -2 }];
+        let course = ClockCourse::new(readings(5, 20, 1e-8, |_| 10.0), steps).unwrap();
+        let instants = [29.0, 31.0, 32.0, 59.5, 60.0, 61.0].map(|k| course.at(k));
+        let want = [19.0, 21.0, 29.0, 56.5, 55.0, 56.0];
+        assert!(instants.iter().zip(&want).all(|(a, b)| (a - b).abs() < 1e-6), "{instants:?}");
+        assert_eq!(ClockCourse::reference().at(3.25), 3.25);
+    }
+}

@@ -1,0 +1,148 @@
+//! Places where a recording lacks samples, or has some that the reference has not.
+//!
+//! The lags of a recording are a line with steps of whole samples. Each step is put where the samples before
+//! it fit the reference best at the one lag, and those after it at the other.
+
+use super::clock::Step;
+use super::path::{Disagree, Known, Path, Search, median};
+use crate::calibrate::{LagLine, Record, interpolated, stretch};
+use crate::simulate::Instants;
+use crate::units::FastPeriods;
+
+/// Pieces on each side of a step whose median is the lag there.
+const BESIDE: usize = 4;
+/// By how much a rate may wander while a recording is silent: 5 ppm.
+const RATE_WANDERS: f64 = 5e-6;
+/// Samples on each side of the two pieces beside a step that say how well the lags fit.
+const SURE: f64 = 1024.0;
+/// A place of a step is possible if its log-odds against the best one are no worse: much, because errors are
+/// correlated where front ends differ.
+const PLACE_ODDS: f64 = 20.0;
+
+/// A recording whose steps are mended.
+pub(super) struct Placed {
+    /// Lost samples are NaN.
+    pub(super) record: Record,
+    pub(super) steps: Vec<Step>,
+    /// Near all lags of its samples; none of the reference.
+    pub(super) line: Option<LagLine>,
+}
+
+/// The lags before a step and after it.
+struct Jump {
+    before: Known,
+    after: Known,
+    lost: i64,
+}
+
+/// Finds the steps of a recording that lies near a line.
+pub(super) fn mended(reference: &Record, other: &Record, line: LagLine) -> Result<Placed, Disagree> {
+    let path = Search::new(reference, other, line).known()?;
+    let jumps = jumps(&path);
+    let mut steps: Vec<Step> = Vec::new();
+    for jump in &jumps {
+        let begin = steps.last().map_or(0, |step| step.samples.end);
+        steps.push(place(reference, other, jump, path.rate, begin));
+    }
+    let record = Record {
+        samples: spliced(&other.samples, &steps, f64::NAN),
+        imaginary: None,
+        keep: spliced(&other.keep, &steps, false),
+        clipped: other.clipped,
+    };
+    Ok(Placed { record, steps, line: Some(line_of(&path, &jumps)) })
+}
+
+/// The samples of a recording without its steps: a filler takes the place of those that are lost, or that
+/// belong to neither side of a step.
+pub(super) fn spliced<T: Copy>(samples: &[T], steps: &[Step], filler: T) -> Vec<T> {
+    let (mut whole, mut begin) = (Vec::with_capacity(samples.len()), 0);
+    for Step { samples: at, lost } in steps {
+        whole.extend_from_slice(&samples[begin..at.start]);
+        let missing = at.len() as i64 + lost;
+        whole.resize(whole.len() + missing.max(0) as usize, filler);
+        begin = at.end;
+    }
+    whole.extend_from_slice(&samples[begin..]);
+    whole
+}
+
+/// Where lags of pieces in a row differ by more than clocks do.
+fn jumps(path: &Path) -> Vec<Jump> {
+    let Path { known, rate, near } = path;
+    let beyond: Vec<f64> = known.iter().map(|known| known.lag - rate * known.at).collect();
+    let is_jump = |k: &usize| {
+        let apart = known[*k].at - known[k - 1].at;
+        (beyond[*k] - beyond[k - 1]).abs() > 2.0 * near + RATE_WANDERS * apart
+    };
+    let mut cuts = vec![0];
+    cuts.extend((1..known.len()).filter(is_jump));
+    cuts.push(known.len());
+    let near = |pieces: &[f64], at: f64| Known { at, lag: median(pieces.to_vec()) + rate * at };
+    let jump = |cuts: &[usize]| {
+        let (left, right) = (&beyond[cuts[0]..cuts[1]], &beyond[cuts[1]..cuts[2]]);
+        let before = near(&left[left.len().saturating_sub(BESIDE)..], known[cuts[1] - 1].at);
+        let after = near(&right[..right.len().min(BESIDE)], known[cuts[1]].at);
+        let grown = after.lag - before.lag - rate * (after.at - before.at);
+        Jump { before, after, lost: -(grown.round() as i64) }
+    };
+    cuts.windows(3).map(jump).filter(|jump| jump.lost != 0).collect()
+}
+
+/// The line of least squares through the lags without the jumps; its error holds all of them.
+fn line_of(path: &Path, jumps: &[Jump]) -> LagLine {
+    let lost = |at: f64| jumps.iter().filter(|jump| jump.after.at <= at).map(|jump| jump.lost).sum::<i64>();
+    let all: Vec<Known> =
+        path.known.iter().map(|known| Known { lag: known.lag + lost(known.at) as f64, ..*known }).collect();
+    let mean = |of: fn(&Known) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
+    let (at, lag) = (mean(|known| known.at), mean(|known| known.lag));
+    let squares: f64 = all.iter().map(|known| (known.at - at).powi(2)).sum();
+    let rate = all.iter().map(|known| (known.at - at) * (known.lag - lag)).sum::<f64>() / squares;
+    let miss = |known: &Known| (known.lag - lag - rate * (known.at - at)).abs();
+    let most = all.iter().map(miss).fold(0.0, f64::max);
+    LagLine::new(at, lag, rate, most / (0.5 * (all[all.len() - 1].at - all[0].at)))
+}
+
+/// A jump with its place: from sample `begin` of the recording on, the first sample after those of the one
+/// lag, such that the errors of all samples by their own lags are least.
+fn place(reference: &Record, other: &Record, jump: &Jump, rate: f64, begin: usize) -> Step {
+    let Jump { before, after, lost } = jump;
+    let last = other.samples.len();
+    let first = ((before.at + before.lag - SURE).max(0.0) as usize).max(begin).min(last);
+    let end = ((after.at + after.lag + SURE) as usize).clamp(first, last);
+    let surplus = ((-lost).max(0) as usize).min(end - first);
+    let own = stretch(other, first as i64, end - first);
+    let [early, late] = [before, after].map(|known| {
+        let instant = known.at + (first as f64 - known.at - known.lag) / (1.0 + rate);
+        let step = FastPeriods(1.0 / (1.0 + rate));
+        interpolated(reference, Instants { first: FastPeriods(instant), step, count: own.len() })
+    });
+    let sure = (SURE as usize).min(own.len());
+    let products = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let (start, rest) = (&early[..sure], &late[own.len() - sure..]);
+    let gain = (products(start, &own) + products(rest, &own[own.len() - sure..]))
+        / (products(start, start) + products(rest, rest));
+    let errors = |expected: Vec<f64>| -> Vec<f64> {
+        let kept = other.keep[first..end].iter().map(|keep| f64::from(*keep));
+        own.iter().zip(expected).zip(kept).map(|((x, y), keep)| keep * (x - gain * y).powi(2)).collect()
+    };
+    let costs = costs(&errors(early), &errors(late), surplus);
+    let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+    let variance = least / costs.len().max(1) as f64;
+    let possible = |cost: &f64| *cost <= least + 2.0 * PLACE_ODDS * variance;
+    let from = costs.iter().position(possible).unwrap_or(0);
+    let to = costs.iter().rposition(possible).unwrap_or(0);
+    Step { samples: first + from..(first + to + surplus).min(last), lost: *lost }
+}
+
+/// The sum of the errors for each number of samples before a step, after which so many belong to neither
+/// side.
+fn costs(early: &[f64], late: &[f64], surplus: usize) -> Vec<f64> {
+    let mut cost: f64 = late.iter().skip(surplus).sum();
+    let mut costs = vec![cost];
+    for (early, late) in early.iter().zip(late.iter().skip(surplus)) {
+        cost += early - late;
+        costs.push(cost);
+    }
+    costs
+}

@@ -1,0 +1,187 @@
+//! The instants of all samples on the clock of the first source, and their gains.
+
+use super::error::{MergeError, MergeWarning};
+use super::{Found, Source};
+use crate::align::{AlignSettings, AlignWarning, Alignment, align};
+use crate::calibrate::Record;
+use crate::instants::{
+    Clock, ClockError, Converter, Estimator, FusionSettings, Recording, Signals, Spectrum, fuse,
+};
+use crate::linalg::Complex;
+use crate::spec::Spec;
+use crate::units::{CyclesPerFastPeriod, FastPeriods, Hertz, Seconds};
+
+/// Samples between two knots of a clock: its rate is constant over them.
+const KNOT_EVERY: usize = 256;
+/// Relative difference of rates that count as one.
+const SAME_RATE: f64 = 0.005;
+/// Samples on either side from which a recording is brought to another rate.
+const REACH: usize = 16;
+/// The part of the lower one of two rates that is kept of a signal.
+const KEPT: f64 = 0.45;
+
+/// Recordings with their clocks, in periods of the output.
+pub(super) struct Placed {
+    pub(super) recordings: Vec<Recording>,
+    pub(super) found: Vec<Found>,
+    pub(super) gains: Vec<f64>,
+    /// The mean of the first source, which is subtracted from all.
+    pub(super) level: f64,
+    pub(super) warnings: Vec<MergeWarning>,
+}
+
+/// Where all sources lie in time.
+///
+/// # Errors
+/// [`MergeError`].
+pub(super) fn placed(sources: &[Source], rate: Hertz, within: Option<Seconds>) -> Result<Placed, MergeError> {
+    let has_stamps = |source: &&Source| source.stamps.is_some();
+    match (sources.iter().find(has_stamps), sources.iter().find(|source| !has_stamps(source))) {
+        (Some(stamped), Some(plain)) => {
+            Err(MergeError::SomeStamps { stamped: stamped.name.clone(), plain: plain.name.clone() })
+        }
+        (Some(_), None) => by_stamps(sources, rate),
+        _ if sources.len() == 1 => Ok(alone(&sources[0], rate)),
+        _ => by_alignment(sources, rate, within),
+    }
+}
+
+/// The samples, NaN where they are not usable, with the mean of those that are.
+fn usable(record: &Record) -> (Vec<f64>, f64) {
+    let samples: Vec<f64> =
+        record.samples.iter().zip(&record.keep).map(|(x, keep)| if *keep { *x } else { f64::NAN }).collect();
+    let there = samples.iter().filter(|x| x.is_finite());
+    let (sum, count) = there.fold((0.0, 0_usize), |(sum, count), x| (sum + x, count + 1));
+    (samples, sum / count.max(1) as f64)
+}
+
+fn recording(samples: &[f64], clock: Clock, number: usize, level: f64) -> Recording {
+    Recording::new(samples.iter().map(|x| x - level).collect(), clock, number)
+}
+
+fn plain(start: Seconds) -> Found {
+    Found { start, drift: None, gain: None, noise: 0.0, steps: Vec::new() }
+}
+
+fn alone(source: &Source, rate: Hertz) -> Placed {
+    let (samples, level) = usable(&source.record);
+    let clock = Clock::even(FastPeriods(0.0), FastPeriods(rate.0 / source.rate.0));
+    Placed {
+        recordings: vec![recording(&samples, clock, 0, level)],
+        found: vec![plain(Seconds(0.0))],
+        gains: vec![1.0],
+        level,
+        warnings: Vec::new(),
+    }
+}
+
+fn by_stamps(sources: &[Source], rate: Hertz) -> Result<Placed, MergeError> {
+    let stamps = |source: &Source| source.stamps.clone().unwrap_or_default();
+    let origin = stamps(&sources[0]).first().copied().unwrap_or(Seconds(0.0));
+    let level = usable(&sources[0].record).1;
+    let (mut recordings, mut found) = (Vec::new(), Vec::new());
+    for (number, source) in sources.iter().enumerate() {
+        let stamps = stamps(source);
+        let instants: Vec<FastPeriods> =
+            stamps.iter().map(|stamp| FastPeriods((stamp.0 - origin.0) * rate.0)).collect();
+        let refused = |problem: ClockError| MergeError::Stamps { name: source.name.clone(), problem };
+        let clock = Clock::stamps(&instants).map_err(refused)?;
+        recordings.push(recording(&usable(&source.record).0, clock, number, level));
+        found.push(plain(stamps.first().map_or(Seconds(0.0), |first| *first - origin)));
+    }
+    Ok(Placed { recordings, found, gains: vec![1.0; sources.len()], level, warnings: Vec::new() })
+}
+
+fn by_alignment(sources: &[Source], rate: Hertz, within: Option<Seconds>) -> Result<Placed, MergeError> {
+    let own = sources[0].rate;
+    let records: Vec<Record> = sources.iter().map(|source| at_rate(source, own)).collect::<Result<_, _>>()?;
+    // The spec counts in samples.
+    let settings = AlignSettings { reference: 0, within: within.map(|time| Seconds(time.0 * own.0)) };
+    let alignment = align(&spec(sources.len())?, &records, settings)?;
+    let level = usable(&sources[0].record).1;
+    let ratio = rate.0 / own.0;
+    let (mut recordings, mut found) = (Vec::new(), Vec::new());
+    for (number, source) in sources.iter().enumerate() {
+        let Place { clock, samples } = place(source, &alignment, number, own, ratio);
+        let channel = alignment.channels[number];
+        let begin = clock.at(0.0);
+        let offset = if number == 0 { level } else { channel.offset.value + channel.gain.value * level };
+        recordings.push(recording(&samples, clock, number, offset));
+        found.push(Found {
+            start: Seconds(begin.0 / rate.0),
+            drift: Some(channel.drift),
+            gain: Some(channel.gain),
+            noise: 0.0,
+            steps: alignment.instants(number).steps().to_vec(),
+        });
+    }
+    let gains = alignment.channels.iter().map(|channel| channel.gain.value).collect();
+    // Taps follow the delays, and the predicted error says what coincidences cost.
+    let is_of_fixed = |warning: &AlignWarning| {
+        matches!(
+            warning,
+            AlignWarning::FixedTaps { .. } | AlignWarning::Coincidence { .. } | AlignWarning::Values(_)
+        )
+    };
+    let warnings = alignment.warnings.into_iter().filter(|warning| !is_of_fixed(warning));
+    Ok(Placed { recordings, found, gains, level, warnings: warnings.map(MergeWarning::from).collect() })
+}
+
+struct Place {
+    clock: Clock,
+    samples: Vec<f64>,
+}
+
+/// The clock of a source in periods of the output, and its samples without those amid a step.
+fn place(source: &Source, alignment: &Alignment, number: usize, own: Hertz, ratio: f64) -> Place {
+    let course = alignment.instants(number);
+    let (mut samples, _) = usable(&source.record);
+    let stretch = if is_same(source.rate, own) { 1.0 } else { own.0 / source.rate.0 };
+    let scaled = |k: usize| (k as f64 / stretch).round() as usize;
+    for step in course.steps() {
+        let end = scaled(step.samples.end).min(samples.len());
+        samples[scaled(step.samples.start).min(end)..end].fill(f64::NAN);
+    }
+    let beside =
+        course.steps().iter().flat_map(|step| [scaled(step.samples.start), scaled(step.samples.end)]);
+    let mut knots: Vec<usize> =
+        (0..samples.len()).step_by(KNOT_EVERY).chain(beside).chain([samples.len()]).collect();
+    knots.sort_unstable();
+    knots.dedup();
+    let instant = |k: &usize| (*k as f64, FastPeriods(course.at(*k as f64 * stretch) * ratio));
+    let even = || Clock::even(FastPeriods(course.at(0.0) * ratio), FastPeriods(ratio * stretch));
+    // Only steps back in time could spoil a clock, and no recorder makes them.
+    Place { clock: Clock::through(knots.iter().map(instant)).unwrap_or_else(|_| even()), samples }
+}
+
+fn is_same(one: Hertz, other: Hertz) -> bool {
+    (one.0 / other.0 - 1.0).abs() < SAME_RATE
+}
+
+/// The record at the rate `own`, to be compared.
+fn at_rate(source: &Source, own: Hertz) -> Result<Record, MergeError> {
+    if is_same(source.rate, own) {
+        return Ok(source.record.clone());
+    }
+    let (samples, level) = usable(&source.record);
+    let period = own.0 / source.rate.0;
+    let clock = Clock::even(FastPeriods(0.0), FastPeriods(period));
+    let count = ((samples.len().max(1) - 1) as f64 * period) as usize + 1;
+    let recordings = [recording(&samples, clock, 0, level)];
+    let settings = FusionSettings { first: FastPeriods(0.0), count, reach: REACH };
+    let band = CyclesPerFastPeriod(0.0)..CyclesPerFastPeriod(KEPT * (1.0 / period).min(1.0));
+    let spectrum = Spectrum::flat(band, settings.longest(&recordings));
+    let converters = vec![Converter::exact(0, 1.0, 1e-6)];
+    let estimator = Estimator::new(Signals::new(&spectrum, &[&|_| Complex::from(1.0)], 0, converters));
+    Ok(Record::new(fuse(&estimator, &recordings, settings)?.samples))
+}
+
+/// Recorders of one rate with equal front ends; time is in their periods.
+fn spec(channels: usize) -> Result<Spec, MergeError> {
+    let front = format!("{{ family = \"butterworth\", order = 2, cutoff = {KEPT} }}");
+    let text = format!("fast_period = 1\nratio = 1\n[target]\nfilter = {front}\n")
+        + &"[[channel]]\ndelay = 0\n".repeat(channels)
+        + "[design]\nmethod = \"fir\"\n";
+    Spec::from_toml(&text, "recorders")
+        .map_err(|refused| MergeError::Count { channels, refused: refused.to_string() })
+}

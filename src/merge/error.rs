@@ -1,0 +1,77 @@
+//! Why recordings cannot be merged, and what a reader of the result must know.
+
+use crate::align::{AlignError, AlignWarning};
+use crate::instants::ClockError;
+use crate::linalg::LinalgError;
+use crate::messages::Quoted;
+use crate::units::Hertz;
+
+/// Why recordings cannot be merged.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MergeError {
+    /// There is none.
+    #[error("no recording is given; give at least one")]
+    NoSources,
+    /// The rate of the output cannot be.
+    #[error("the output cannot have {rate}; ask for more than 0 and at most {most}")]
+    Rate {
+        /// The rate that was asked for.
+        rate: Hertz,
+        /// The highest one.
+        most: Hertz,
+    },
+    /// Some have time stamps, others not.
+    #[error(
+        "{} has time stamps and {} has none; give all of them stamps on one clock, or none",
+        Quoted(.stamped), Quoted(.plain)
+    )]
+    SomeStamps {
+        /// One that has.
+        stamped: String,
+        /// One that has not.
+        plain: String,
+    },
+    /// Time stamps are no clock.
+    #[error("{}: {problem}", Quoted(.name))]
+    Stamps {
+        /// The source.
+        name: String,
+        /// What is wrong with them.
+        problem: ClockError,
+    },
+    /// They lie at different times.
+    #[error(
+        "all recordings together have {seconds:.3} s in common, of up to {samples} samples; give recordings of one event \
+         that overlap"
+    )]
+    Overlap {
+        /// Time in common.
+        seconds: f64,
+        /// Samples of the longest one.
+        samples: usize,
+    },
+    /// More recordings than a spec has channels.
+    #[error("{channels} recordings are too many: {refused}")]
+    Count {
+        /// How many there are.
+        channels: usize,
+        /// What a spec says of them.
+        refused: String,
+    },
+    /// Starts and clocks cannot be found.
+    #[error(transparent)]
+    Align(#[from] AlignError),
+    /// The model has no taps.
+    #[error("two samples of one recorder lie at one instant ({0}); remove lines of one time")]
+    Singular(#[from] LinalgError),
+}
+
+/// What a reader of merged recordings must know.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MergeWarning {
+    /// Found on the way.
+    #[error(transparent)]
+    Align(#[from] AlignWarning),
+}

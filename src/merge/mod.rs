@@ -1,0 +1,206 @@
+//! Recordings of one event by ordinary recorders become one at a higher rate.
+//!
+//! Starts, drifts, polarities and gains come from [`align`](crate::align), or the instants from time stamps.
+//! Spectrum and noise are measured from the recordings ([`Model`]); then every output is the linear estimate
+//! of least mean-square error from the samples around it. One recording alone, and the mean of all, are such
+//! estimates with other taps, so none of them is better by this model.
+
+mod clocks;
+mod error;
+#[cfg(test)]
+mod tests;
+
+pub use error::{MergeError, MergeWarning};
+
+use crate::align::Step;
+use crate::calibrate::Record;
+use crate::instants::{Fused, FusionSettings, Model, Prior, Recording, fuse};
+use crate::sine_fit::Estimate;
+use crate::units::{CyclesPerFastPeriod, Decibels, FastPeriods, Hertz, Seconds};
+use clocks::Placed;
+
+/// Passes in which the spectrum is learned; a third gains nothing.
+const PASSES: usize = 2;
+/// Samples of each recording on either side of an output.
+const REACH: usize = 24;
+/// Outputs below which nothing can be measured.
+const LEAST_OUTPUTS: usize = 1024;
+/// Most outputs for each sample of all recordings.
+const MOST_OUTPUTS: f64 = 64.0;
+/// What all recordings must gain over one alone or their mean to be worth it.
+const WORTH: Decibels = Decibels(0.5);
+
+/// What one recorder or logger delivered.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Source {
+    /// Its name in messages.
+    pub name: String,
+    /// The samples; of clipped and lost ones nothing is used.
+    pub record: Record,
+    /// Samples per second.
+    pub rate: Hertz,
+    /// The step of its numbers; 0 for floats.
+    pub step: f64,
+    /// When the samples were taken; all sources have stamps or none.
+    pub stamps: Option<Vec<Seconds>>,
+}
+
+/// How recordings are merged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MergeSettings {
+    /// Outputs per second. `None` for the largest multiple of the first source's rate that does not exceed
+    /// the sum of all rates.
+    pub rate: Option<Hertz>,
+    /// The end of the signal's band, if it is known.
+    pub band: Option<Hertz>,
+    /// Whether the spectrum is learned; else it counts as flat over the band.
+    pub learn: bool,
+    /// How far apart the recordings began at most, if that is known.
+    pub within: Option<Seconds>,
+}
+
+/// One recording from several.
+#[derive(Debug, Clone)]
+pub struct Merged {
+    /// The samples, on the clock of the first source.
+    pub samples: Vec<f64>,
+    /// Samples per second.
+    pub rate: Hertz,
+    /// The sample of the first source at whose instant the first output lies.
+    pub first: usize,
+    /// Its instant after the first sample of that source.
+    pub begin: Seconds,
+    /// What was found of each source.
+    pub sources: Vec<Found>,
+    /// The predicted quality.
+    pub quality: Quality,
+    /// What a reader must know.
+    pub warnings: Vec<MergeWarning>,
+}
+
+/// What was found of a source.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// When its first sample was taken, after the first one of the first source.
+    pub start: Seconds,
+    /// By how much its clock is fast; none with stamps.
+    pub drift: Option<Estimate<f64>>,
+    /// Its gain over that of the first source, negative for the other polarity; none with stamps.
+    pub gain: Option<Estimate<f64>>,
+    /// Rms of its noise, with all that recorders do not have in common.
+    pub noise: f64,
+    /// Where it lost samples.
+    pub steps: Vec<Step>,
+}
+
+/// The predicted signal-to-noise ratios.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quality {
+    /// Of the whole result.
+    pub snr: Decibels,
+    /// Of its worst second, against the power of the whole.
+    pub worst_second: Decibels,
+    /// When that second begins, after the first output.
+    pub worst_at: Seconds,
+    /// Of each source alone.
+    pub alone: Vec<Decibels>,
+    /// Of the mean of what the sources give alone.
+    pub mean: Decibels,
+}
+
+impl Quality {
+    /// The source, from 0, that alone is as good as all together.
+    pub fn sufficient(&self) -> Option<usize> {
+        (0..self.alone.len()).find(|&i| self.alone[i].0 + WORTH.0 >= self.snr.0)
+    }
+}
+
+/// Merges recordings.
+///
+/// # Errors
+/// [`MergeError`].
+pub fn merge(sources: &[Source], settings: MergeSettings) -> Result<Merged, MergeError> {
+    let rate = output_rate(sources, settings)?;
+    let Placed { recordings, found, gains, level, warnings } =
+        clocks::placed(sources, rate, settings.within)?;
+    let (first, grid) = grid(sources, &recordings, rate)?;
+    let step_noise = |source: &Source| source.step * source.step / 12.0;
+    let prior = Prior {
+        band: settings.band.map(|band| CyclesPerFastPeriod((band.0 / rate.0).min(0.5))),
+        passes: if settings.learn { PASSES } else { 0 },
+        gains,
+        least_noise: sources.iter().map(step_noise).collect(),
+    };
+    let model = Model::learn(&recordings, &prior, grid)?;
+    let fused = fuse(&model.estimator, &recordings, grid)?;
+    let quality = quality(&model, &fused, &recordings, grid, rate)?;
+    let noise = |(found, noise): (Found, &f64)| Found { noise: noise.sqrt(), ..found };
+    let sources = found.into_iter().zip(&model.noise).map(noise).collect();
+    let samples = fused.samples.iter().map(|x| x + level).collect();
+    let begin = Seconds(grid.first.0 / rate.0);
+    Ok(Merged { samples, rate, first, begin, sources, quality, warnings })
+}
+
+fn output_rate(sources: &[Source], settings: MergeSettings) -> Result<Hertz, MergeError> {
+    let first = sources.first().ok_or(MergeError::NoSources)?.rate;
+    let sum: f64 = sources.iter().map(|source| source.rate.0).sum();
+    // Stated rates are rounded.
+    let usual = first * (sum / first.0 + 1e-3).floor();
+    let rate = settings.rate.unwrap_or(usual);
+    if rate.0 > 0.0 && rate.0 <= MOST_OUTPUTS * sum {
+        Ok(rate)
+    } else {
+        Err(MergeError::Rate { rate, most: Hertz(MOST_OUTPUTS * sum) })
+    }
+}
+
+/// The first sample of the first source that all have in common, and the outputs from there on.
+fn grid(
+    sources: &[Source],
+    recordings: &[Recording],
+    rate: Hertz,
+) -> Result<(usize, FusionSettings), MergeError> {
+    let own = recordings[0].clock();
+    let begin = recordings.iter().map(|one| one.span().start.0).fold(f64::NEG_INFINITY, f64::max);
+    let end = recordings.iter().map(|one| one.span().end.0).fold(f64::INFINITY, f64::min);
+    // A sample at the very beginning counts, whatever the rounding.
+    let first = (own.sample_at(FastPeriods(begin)) - 1e-6).ceil().max(0.0);
+    let begin = own.at(first);
+    let count = (end - begin.0 + 1.0).max(0.0) as usize;
+    if count < LEAST_OUTPUTS {
+        let most = sources.iter().map(|source| source.record.samples.len()).max().unwrap_or(0);
+        return Err(MergeError::Overlap { seconds: count as f64 / rate.0, samples: most });
+    }
+    Ok((first as usize, FusionSettings { first: begin, count, reach: REACH }))
+}
+
+/// Errors of the signal count by the power around, those of the noise as they are.
+fn quality(
+    model: &Model,
+    fused: &Fused,
+    recordings: &[Recording],
+    grid: FusionSettings,
+    rate: Hertz,
+) -> Result<Quality, MergeError> {
+    let power = |block: &[f64]| block.iter().map(|x| x * x).sum::<f64>();
+    let blocks = fused.samples.chunks(fused.block).zip(&fused.errors);
+    let errors: Vec<f64> = blocks
+        .map(|(block, error)| error.signal * power(block) + error.noise * model.power * block.len() as f64)
+        .collect();
+    let total = power(&fused.samples);
+    let second = ((rate.0 / fused.block as f64).round() as usize).clamp(1, errors.len());
+    let of_second = |k: usize| errors[k..k + second].iter().sum::<f64>();
+    let worst =
+        (0..=errors.len() - second).max_by(|a, b| of_second(*a).total_cmp(&of_second(*b))).unwrap_or(0);
+    let per_sample = total / fused.samples.len() as f64;
+    let of_worst = of_second(worst) / (second * fused.block) as f64;
+    let ways = model.ways(recordings, grid)?;
+    let ratio = |error: f64| Decibels::of_power(1.0 / error.max(f64::MIN_POSITIVE));
+    Ok(Quality {
+        snr: ratio(errors.iter().sum::<f64>() / total),
+        worst_second: ratio(of_worst / per_sample),
+        worst_at: Seconds((worst * fused.block) as f64 / rate.0),
+        alone: ways.alone.iter().map(|error| ratio(error.total())).collect(),
+        mean: ratio(ways.mean.total()),
+    })
+}
