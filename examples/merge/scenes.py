@@ -94,7 +94,7 @@ SCENES = {
 }
 
 
-def run(name, folder, seconds=16.0):
+def run(name, folder, seconds=float(os.environ.get("SECONDS_OF_SCENE", 16))):
     kind, top, recorders, rate = SCENES[name]
     x = signal(kind, seconds + 3, 3, top)
     rng = np.random.default_rng(9)

@@ -16,8 +16,13 @@ const PARTS: usize = 128;
 const OUTPUTS_OF_PART: usize = 2048;
 /// Instants at which samples are left out, to measure the noise.
 const TRIALS: usize = 64;
-/// The noise of the first pass, over the power of the signal: as of recorders with 50 dB.
-const FIRST_NOISE: f64 = 1e-5;
+/// Noises that are tried with each band, over the power of the signal: as of recorders with 30, 50 and 70 dB.
+const FIRST_NOISES: [f64; 3] = [1e-3, 1e-5, 1e-7];
+/// Bands that are tried: parts of half of the output's rate.
+const BANDS: std::ops::RangeInclusive<u32> = 3..=16;
+/// The density beyond the band over that within, before the spectrum is learned: 30 dB below. What is there
+/// is told from what is not.
+const BEYOND: f64 = 1e-3;
 /// By what the variance of the noise changes from trial to trial, coarse to fine: 10, 3 and 1 dB.
 const FACTORS: [f64; 3] = [10.0, 1.995_262_314_968_879_6, 1.258_925_411_794_167_2];
 
@@ -37,12 +42,16 @@ pub struct Model {
 /// What is known of recordings before they are looked at.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
-    /// The frequencies of the signal; all up to half of the output's rate, if `None`.
+    /// The end of the signal's band; measured if `None`.
     pub band: Option<CyclesPerFastPeriod>,
     /// How often the spectrum is learned from the result; 0 keeps it flat over the band.
     pub passes: usize,
     /// The gain of each recording.
     pub gains: Vec<f64>,
+    /// Standard deviations of these, relative to them.
+    pub gain_deviations: Vec<f64>,
+    /// Standard deviation of an error that all instants of a recording share.
+    pub delay_deviations: Vec<FastPeriods>,
     /// The least variance of the noise of each recording: of its rounding.
     pub least_noise: Vec<f64>,
 }
@@ -50,9 +59,10 @@ pub struct Prior {
 impl Model {
     /// The model of `recordings`, which the converters 0, 1, .. made in their order.
     ///
-    /// A first estimate with a flat spectrum shows the spectrum (Welch), over the half of the run where the
-    /// predicted error is least: elsewhere what is not resolved would be taken for signal. The noise of each
-    /// recording is that with which samples that are left out are predicted best, by their likelihood.
+    /// Samples that are left out and predicted from those around them judge a model, by their likelihood. So
+    /// the band is chosen, and the noise of each recording. The estimate with a spectrum that is flat over the
+    /// band then shows the spectrum (Welch), over the half of the run where the predicted error is least:
+    /// elsewhere what is not resolved would be taken for signal.
     ///
     /// # Errors
     /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
@@ -62,24 +72,64 @@ impl Model {
         settings: FusionSettings,
     ) -> Result<Self, LinalgError> {
         let longest = settings.longest(recordings);
-        let highest = prior.band.unwrap_or(CyclesPerFastPeriod(0.5));
-        let spectrum = Spectrum::flat(CyclesPerFastPeriod(0.0)..highest, longest);
         let power = mean_power(recordings, &prior.gains);
-        let noise = prior.gains.iter().zip(&prior.least_noise);
-        let noise = noise.map(|(gain, least)| least.max(FIRST_NOISE * power * gain * gain)).collect();
-        let mut model = Self::new(spectrum, power, noise, &prior.gains);
+        let first = |spectrum: Spectrum, share: f64| {
+            let noise = prior.gains.iter().zip(&prior.least_noise);
+            let noise = noise.map(|(gain, least)| least.max(share * power * gain * gain)).collect();
+            Self::new(spectrum, power, noise, prior)
+        };
+        let mut model = Self::best(recordings, prior.band, settings, &first)?;
         model.measure_noise(recordings, prior, settings)?;
         for _ in 0..prior.passes {
             let Some((spectrum, power)) = model.relearned(recordings, settings, longest)? else { break };
-            model = Self::new(spectrum, power, model.noise, &prior.gains);
+            model = Self::new(spectrum, power, model.noise, prior);
             model.measure_noise(recordings, prior, settings)?;
         }
         Ok(model)
     }
 
-    fn new(spectrum: Spectrum, power: f64, noise: Vec<f64>, gains: &[f64]) -> Self {
-        let converter = |(gain, noise): (&f64, &f64)| Converter::exact(0, *gain, noise / power);
-        let converters = gains.iter().zip(&noise).map(converter).collect();
+    /// The model of a flat band, of those with some noises, by which samples that are left out are predicted
+    /// best.
+    fn best(
+        recordings: &[Recording],
+        band: Option<CyclesPerFastPeriod>,
+        settings: FusionSettings,
+        model: &dyn Fn(Spectrum, f64) -> Self,
+    ) -> Result<Self, LinalgError> {
+        let (longest, instants) = (settings.longest(recordings), instants(settings, TRIALS));
+        let (low, high) = (CyclesPerFastPeriod(0.0), CyclesPerFastPeriod(0.5));
+        let spectra: Vec<Spectrum> = match band {
+            Some(band) => vec![Spectrum::flat(low..band, longest)],
+            None => BANDS
+                .map(|part| CyclesPerFastPeriod(0.5 * f64::from(part) / f64::from(*BANDS.end())))
+                .map(|band| Spectrum::of_pieces([(low..band, 1.0), (band..high, BEYOND)], longest))
+                .collect(),
+        };
+        let mut best = model(spectra[0].clone(), FIRST_NOISES[0]);
+        let mut least = f64::INFINITY;
+        for (spectrum, noise) in
+            spectra.iter().flat_map(|spectrum| FIRST_NOISES.map(|noise| (spectrum, noise)))
+        {
+            let candidate = model(spectrum.clone(), noise);
+            let found =
+                held_out(&candidate.estimator, recordings, settings.reach, candidate.power, &instants)?;
+            let misfit = misfit(&found, candidate.power);
+            if misfit < least {
+                (best, least) = (candidate, misfit);
+            }
+        }
+        Ok(best)
+    }
+
+    fn new(spectrum: Spectrum, power: f64, noise: Vec<f64>, prior: &Prior) -> Self {
+        let converter = |i: usize| Converter {
+            front_end: 0,
+            gain: prior.gains[i],
+            noise: noise[i] / power,
+            delay_deviation: prior.delay_deviations[i],
+            gain_deviation: prior.gain_deviations[i],
+        };
+        let converters = (0..noise.len()).map(converter).collect();
         let signals = Signals::new(&spectrum, &[&|_| Complex::from(1.0)], 0, converters);
         Self { spectrum, power, noise, estimator: Estimator::new(signals) }
     }

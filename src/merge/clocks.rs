@@ -2,12 +2,13 @@
 
 use super::error::{MergeError, MergeWarning};
 use super::{Found, Source};
-use crate::align::{AlignSettings, AlignWarning, Alignment, align};
+use crate::align::{AlignSettings, AlignWarning, Alignment, ClockCourse, align};
 use crate::calibrate::Record;
 use crate::instants::{
     Clock, ClockError, Converter, Estimator, FusionSettings, Recording, Signals, Spectrum, fuse,
 };
 use crate::linalg::Complex;
+use crate::sine_fit::Estimate;
 use crate::spec::Spec;
 use crate::units::{CyclesPerFastPeriod, FastPeriods, Hertz, Seconds};
 
@@ -25,6 +26,10 @@ pub(super) struct Placed {
     pub(super) recordings: Vec<Recording>,
     pub(super) found: Vec<Found>,
     pub(super) gains: Vec<f64>,
+    /// Relative to the gains.
+    pub(super) gain_deviations: Vec<f64>,
+    /// Of all instants of a recording.
+    pub(super) delay_deviations: Vec<FastPeriods>,
     /// The mean of the first source, which is subtracted from all.
     pub(super) level: f64,
     pub(super) warnings: Vec<MergeWarning>,
@@ -70,6 +75,8 @@ fn alone(source: &Source, rate: Hertz) -> Placed {
         recordings: vec![recording(&samples, clock, 0, level)],
         found: vec![plain(Seconds(0.0))],
         gains: vec![1.0],
+        gain_deviations: vec![0.0],
+        delay_deviations: vec![FastPeriods(0.0)],
         level,
         warnings: Vec::new(),
     }
@@ -89,7 +96,16 @@ fn by_stamps(sources: &[Source], rate: Hertz) -> Result<Placed, MergeError> {
         recordings.push(recording(&usable(&source.record).0, clock, number, level));
         found.push(plain(stamps.first().map_or(Seconds(0.0), |first| *first - origin)));
     }
-    Ok(Placed { recordings, found, gains: vec![1.0; sources.len()], level, warnings: Vec::new() })
+    let count = sources.len();
+    Ok(Placed {
+        recordings,
+        found,
+        gains: vec![1.0; count],
+        gain_deviations: vec![0.0; count],
+        delay_deviations: vec![FastPeriods(0.0); count],
+        level,
+        warnings: Vec::new(),
+    })
 }
 
 fn by_alignment(sources: &[Source], rate: Hertz, within: Option<Seconds>) -> Result<Placed, MergeError> {
@@ -115,7 +131,10 @@ fn by_alignment(sources: &[Source], rate: Hertz, within: Option<Seconds>) -> Res
             steps: alignment.instants(number).steps().to_vec(),
         });
     }
-    let gains = alignment.channels.iter().map(|channel| channel.gain.value).collect();
+    let gains: Vec<Estimate<f64>> = alignment.channels.iter().map(|channel| channel.gain).collect();
+    let deviation =
+        |i: usize| FastPeriods(ratio * rms_deviation(alignment.instants(i), records[i].samples.len()));
+    let delay_deviations = (0..sources.len()).map(deviation).collect();
     // Taps follow the delays, and the predicted error says what coincidences cost.
     let is_of_fixed = |warning: &AlignWarning| {
         matches!(
@@ -123,8 +142,22 @@ fn by_alignment(sources: &[Source], rate: Hertz, within: Option<Seconds>) -> Res
             AlignWarning::FixedTaps { .. } | AlignWarning::Coincidence { .. } | AlignWarning::Values(_)
         )
     };
-    let warnings = alignment.warnings.into_iter().filter(|warning| !is_of_fixed(warning));
-    Ok(Placed { recordings, found, gains, level, warnings: warnings.map(MergeWarning::from).collect() })
+    let warnings = alignment.warnings.iter().cloned().filter(|warning| !is_of_fixed(warning));
+    Ok(Placed {
+        recordings,
+        found,
+        gains: gains.iter().map(|gain| gain.value).collect(),
+        gain_deviations: gains.iter().map(|gain| gain.sigma / gain.value.abs()).collect(),
+        delay_deviations,
+        level,
+        warnings: warnings.map(MergeWarning::from).collect(),
+    })
+}
+
+/// Of the instants of so many samples.
+fn rms_deviation(course: &ClockCourse, count: usize) -> f64 {
+    let all = (0..count).step_by(KNOT_EVERY).map(|k| course.deviation(k as f64).powi(2));
+    (all.sum::<f64>() / count.div_ceil(KNOT_EVERY).max(1) as f64).sqrt()
 }
 
 struct Place {

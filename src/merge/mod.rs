@@ -121,7 +121,7 @@ impl Quality {
 /// [`MergeError`].
 pub fn merge(sources: &[Source], settings: MergeSettings) -> Result<Merged, MergeError> {
     let rate = output_rate(sources, settings)?;
-    let Placed { recordings, found, gains, level, warnings } =
+    let Placed { recordings, found, gains, gain_deviations, delay_deviations, level, warnings } =
         clocks::placed(sources, rate, settings.within)?;
     let (first, grid) = grid(sources, &recordings, rate)?;
     let step_noise = |source: &Source| source.step * source.step / 12.0;
@@ -129,6 +129,8 @@ pub fn merge(sources: &[Source], settings: MergeSettings) -> Result<Merged, Merg
         band: settings.band.map(|band| CyclesPerFastPeriod((band.0 / rate.0).min(0.5))),
         passes: if settings.learn { PASSES } else { 0 },
         gains,
+        gain_deviations,
+        delay_deviations,
         least_noise: sources.iter().map(step_noise).collect(),
     };
     let model = Model::learn(&recordings, &prior, grid)?;
