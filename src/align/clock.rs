@@ -13,8 +13,9 @@ const GATE_SIGMAS: f64 = 5.0;
 const ROUNDS: usize = 12;
 /// Readings on each side of the worst one that are judged again without it.
 const BESIDE: usize = 4;
-/// Readings without any noise scatter by this share of their deviations.
-const LEAST_SCALE: f64 = 1e-3;
+/// Readings scatter by no less than this share of their deviations, which are those of the Cramer-Rao bound
+/// as far as few samples say it: else a rate that walks through all of them would explain them.
+const LEAST_SCALE: f64 = 0.7;
 /// A sum of negative logarithms that is larger than the least by this may be the right one: half the 95 %
 /// point of chi-square with one degree of freedom.
 const LIKELY_SURPRISE: f64 = 1.92;
@@ -199,10 +200,10 @@ impl Judged {
         let ratios = || all.iter().map(|out| out.miss / out.deviation);
         let most = GATE_SIGMAS * usual(ratios().collect());
         let count = all.len() as f64;
-        let scale = (ratios().map(|ratio| ratio.min(most).powi(2)).sum::<f64>() / count).sqrt();
-        let scale = scale.max(LEAST_SCALE);
+        let squares = ratios().map(|ratio| ratio.min(most).powi(2)).sum::<f64>();
+        let scale = (squares / count).sqrt().max(LEAST_SCALE);
         let deviations = all.iter().map(|out| out.deviation.ln()).sum::<f64>();
-        Self { scale, surprise: deviations + count * scale.ln() }
+        Self { scale, surprise: deviations + count * scale.ln() + 0.5 * squares / (scale * scale) }
     }
 }
 
