@@ -30,6 +30,9 @@ const NEIGHBOURS: f64 = 16.0;
 const MOST_DRIFT: f64 = 2.2e-3;
 /// Log-odds against chance from which on lags count as found.
 const LEAST_ODDS: f64 = 30.0;
+/// With less the lags of other probes, which samples that are lost explain, are to be less likely: the best of
+/// many lines has high odds by chance.
+const CERTAIN_ODDS: f64 = 120.0;
 /// Other lags with this share of the log-odds of the best ones explain the recordings as well: voices that
 /// say different things correlate far beyond chance, but at many lags.
 const ALIKE_ODDS_SHARE: f64 = 0.5;
@@ -320,7 +323,10 @@ fn likeliest(lags: &[Lag]) -> Result<LagLine, Vec<i64>> {
         lag.probe == own.probe && !line.holds(lag) && lag.sigmas.powi(2) >= share * own.sigmas.powi(2)
     };
     let in_doubt = own.iter().filter(|own| lags.iter().any(|lag| is_rival(lag, own))).count();
-    if best >= LEAST_ODDS && 2 * in_doubt < own.len() {
+    let others: Vec<Lag> = lags.iter().filter(|lag| !line.holds(lag)).copied().collect();
+    let is_likely = |(odds, _): &(f64, LagLine)| *odds >= ALIKE_ODDS_SHARE * best;
+    let is_chance = best < CERTAIN_ODDS && lines(&others).first().is_some_and(is_likely);
+    if best >= LEAST_ODDS && !is_chance && 2 * in_doubt < own.len() {
         return Ok(fitted(&own));
     }
     let mut alike = vec![line.lag];
