@@ -272,11 +272,8 @@ impl LagLine {
         found.sort_by(|a, b| b.height.total_cmp(&a.height));
         let best = found.first().filter(|best| odds(&[**best]) >= LEAST_ODDS)?;
         let is_alike = |other: &&Lag| other.height >= ALIKE_WITHIN_PITCH * best.height;
-        (found.iter().filter(is_alike).count() == 1).then(|| Self {
-            at: best.at,
-            lag: best.lag + begin as f64,
-            ..*self
-        })
+        let line = Self { at: best.at, lag: best.lag + begin as f64, ..*self };
+        (found.iter().filter(is_alike).count() == 1).then_some(line)
     }
 
     /// The lag at a sample of the reference.
