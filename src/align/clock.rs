@@ -13,20 +13,15 @@ const GATE_SIGMAS: f64 = 5.0;
 const ROUNDS: usize = 12;
 /// Readings on each side of the worst one that are judged again without it.
 const BESIDE: usize = 4;
-
-/// Misfits on each side that say how far a reading scatters: sounds change after some pieces.
-const WEIGHED_BY: usize = 6;
-/// Readings without any noise scatter by this share of their deviations.
-const LEAST_SCALE: f64 = 1e-3;
+/// Readings scatter by no less than this share of their deviations, which are those of the Cramer-Rao bound
+/// as far as few samples say it: else a rate that walks through all of them would explain them.
+const LEAST_SCALE: f64 = 0.7;
 /// A sum of negative logarithms that is larger than the least by this may be the right one: half the 95 %
 /// point of chi-square with one degree of freedom.
 const LIKELY_SURPRISE: f64 = 1.92;
 /// Powers of ten of the variance by which a rate may walk per sample. That of 1 ppm in a second is 2e-17 at
 /// 48 kHz.
 const WALKS: std::ops::RangeInclusive<i32> = -26..=-9;
-/// A misfit counts as at most so many of the usual ones: a reading may be wrong altogether, and is refused
-/// later.
-const MOST_MISFIT: f64 = 3.0;
 /// Rounds in which the sample of an instant is found.
 const INVERSE_ROUNDS: usize = 5;
 
@@ -80,7 +75,6 @@ impl ClockCourse {
         if !has_two_samples {
             return None;
         }
-        weigh(&mut readings);
         for _ in 0..ROUNDS {
             let worst = contradictory(&Smooth::new(&readings)?.spline);
             // Without two samples nothing is left to be judged by.
@@ -204,12 +198,12 @@ impl Judged {
     fn new(spline: &SmoothingSpline) -> Self {
         let all: Vec<LeftOut> = spline.left_out().collect();
         let ratios = || all.iter().map(|out| out.miss / out.deviation);
-        let most = MOST_MISFIT * usual(ratios().collect());
+        let most = GATE_SIGMAS * usual(ratios().collect());
         let count = all.len() as f64;
-        let scale = (ratios().map(|ratio| ratio.min(most).powi(2)).sum::<f64>() / count).sqrt();
-        let scale = scale.max(LEAST_SCALE);
+        let squares = ratios().map(|ratio| ratio.min(most).powi(2)).sum::<f64>();
+        let scale = (squares / count).sqrt().max(LEAST_SCALE);
         let deviations = all.iter().map(|out| out.deviation.ln()).sum::<f64>();
-        Self { scale, surprise: deviations + count * scale.ln() }
+        Self { scale, surprise: deviations + count * scale.ln() + 0.5 * squares / (scale * scale) }
     }
 }
 
@@ -228,33 +222,6 @@ fn contradictory(spline: &SmoothingSpline) -> Vec<usize> {
         found[*k] > gate && beside.into_iter().all(|j| j == *k || found[j] < found[*k])
     };
     (0..found.len()).filter(is_worst).collect()
-}
-
-/// Weighs readings by what those beside each scatter. Deviations of pieces are those of the Cramer-Rao
-/// bound, which pieces of little or narrow sound miss by up to twice, while the others reach it.
-///
-/// Misfits are second differences in their stated deviations; overlapping ones are correlated by -2/3 and
-/// 1/6. The variance of a reading relative to the stated one has the scaled inverse chi-square law whose
-/// prior, of two degrees of freedom, is the usual one, and whose data are the misfits.
-fn weigh(readings: &mut [ClockReading]) {
-    let misfit = |three: &[ClockReading]| {
-        let [before, own, after] = [three[0], three[1], three[2]];
-        let share = (own.sample - before.sample) / (after.sample - before.sample);
-        let miss = own.lag - (1.0 - share) * before.lag - share * after.lag;
-        let deviation = own.deviation.hypot((1.0 - share) * before.deviation);
-        miss.abs() / deviation.hypot(share * after.deviation)
-    };
-    let misfits: Vec<f64> = readings.windows(3).map(misfit).collect();
-    let usual = usual(misfits.clone()).max(LEAST_SCALE);
-    let factor = |number: usize| {
-        // The misfit of a reading is one before it, because the first reading has none.
-        let beside = number.saturating_sub(WEIGHED_BY + 1)..(number + WEIGHED_BY).min(misfits.len());
-        let freedom = beside.len() as f64 / (1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0));
-        let square = |misfit: &f64| misfit.min(MOST_MISFIT * usual).powi(2);
-        let mean = misfits[beside.clone()].iter().map(square).sum::<f64>() / beside.len().max(1) as f64;
-        ((freedom * mean + 2.0 * usual * usual) / (freedom + 2.0)).sqrt()
-    };
-    readings.iter_mut().enumerate().for_each(|(number, reading)| reading.deviation *= factor(number));
 }
 
 #[cfg(test)]

@@ -52,11 +52,12 @@ pub enum AlignError {
         /// Samples by which the channel may have begun before the reference.
         lags: Vec<i64>,
     },
-    /// The pieces of two recordings have no course of the lag in common.
+    /// Most pieces have no lag, or another one than those beside them.
     #[error(
-        "only {agreeing} of {pieces} pieces of the recordings of channels {reference} and {channel} agree with the others \
-         on the lag, and most must, by their level; check that both recorded the same event, that neither is drowned in \
-         noise, stretched in time or cut together from parts, and that their clocks differ by less than 2000 ppm"
+        "only {agreeing} of {pieces} pieces of the recordings of channels {reference} and {channel} show one lag and agree on \
+         it with those beside them, and most must, by their level. Check that both recorded the same event, and that \
+         neither is drowned in noise, stretched in time or cut together. If at each instant the signal has a narrow band, as \
+         a sweep has, record a broad sound (noise, speech, claps)"
     )]
     Disagree {
         /// From 1.
@@ -67,19 +68,6 @@ pub enum AlignError {
         agreeing: usize,
         /// Pieces that were compared.
         pieces: usize,
-    },
-    /// At each instant the signal is narrow: a sweep, a tone that glides. Most pieces show several lags, or
-    /// another one than those beside them.
-    #[error(
-        "most pieces of the recordings of channels {reference} and {channel} agree at several lags, or at another lag than \
-         the pieces beside them: at each instant the signal has a narrow band, as a sweep has, and its frequency moves as \
-         a delay would; record a broad sound (noise, speech, claps), or follow the delay by a tone that sounds all the time"
-    )]
-    Narrow {
-        /// From 1.
-        reference: usize,
-        /// From 1.
-        channel: usize,
     },
     /// The recordings were made at the same time for too short a while.
     #[error("all recordings together have {frames} samples in common; at least {needed} are needed")]

@@ -22,7 +22,7 @@ pub use error::{AlignError, AlignWarning};
 pub use reading::Reading;
 
 use crate::calibrate::{
-    CalibrationSignal, ChannelEstimate, Fit, LagLine, Record, Settings, Warning, check, check_parts, line,
+    CalibrationSignal, ChannelEstimate, Fit, Record, Settings, Warning, check, check_parts, line,
 };
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
@@ -30,7 +30,7 @@ use crate::units::Seconds;
 use course::{Course, mean};
 use path::Disagree;
 use pieces::{PieceEstimate, Pieces};
-use steps::{Placed, mended, spliced};
+use steps::{Lags, Placed, mended, spliced};
 
 /// Least samples that all recordings have in common.
 const LEAST_SAMPLES: usize = 1024;
@@ -140,16 +140,16 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
     enough(records.iter().map(|record| record.samples.len()).min().unwrap_or(0))?;
     let within = within.map_or(f64::INFINITY, |time| time / (spec.fast_period * spec.ratio as f64));
     let placed = |i: usize| match i == reference {
-        true => Ok(Placed { record: records[i].clone(), steps: Vec::new(), line: None }),
+        true => Ok(Placed { record: records[i].clone(), steps: Vec::new(), lags: Lags::none() }),
         false => placed(records, reference, i, within),
     };
     let placed = (0..records.len()).map(placed).collect::<Result<Vec<_>, _>>()?;
-    let lines: Vec<Option<LagLine>> = placed.iter().map(|placed| placed.line).collect();
+    let lags: Vec<Lags> = placed.iter().map(|placed| placed.lags.clone()).collect();
     let steps: Vec<Vec<Step>> = placed.iter().map(|placed| placed.steps.clone()).collect();
     let whole: Vec<Record> = placed.into_iter().map(|placed| placed.record).collect();
-    let stretches = Stretches::new(&whole, reference, &lines)?;
+    let stretches = Stretches::new(&whole, reference, &lags)?;
     let pieces = stretches.firsts().len();
-    let estimates = Pieces::new(spec, &whole, fit, &stretches).measure(&lines)?;
+    let estimates = Pieces::new(spec, &whole, &lags, fit, &stretches).measure()?;
     let few = AlignError::NotMeasured { measured: estimates.len(), pieces, reason: None };
     let course = Course::new(spec, reference, &steps, &estimates, &stretches).ok_or(few)?;
     Ok(alignment(spec, &whole, course, &estimates, pieces))
@@ -182,27 +182,22 @@ struct Stretches {
     end: f64,
     /// Samples of a piece.
     length: usize,
-    /// Further ones of the other recordings on each side.
-    margin: usize,
 }
 
 impl Stretches {
-    fn new(records: &[Record], reference: usize, lines: &[Option<LagLine>]) -> Result<Self, AlignError> {
+    fn new(records: &[Record], reference: usize, lags: &[Lags]) -> Result<Self, AlignError> {
         let (mut first, mut end) = (0.0_f64, records[reference].samples.len() as f64);
-        for (line, record) in lines.iter().zip(records) {
-            let Some(line) = line else { continue };
+        for (lags, record) in lags.iter().zip(records) {
             let samples = record.samples.len() as f64;
-            first = first.max(-line.lag_at(-line.lag_at(0.0)));
-            end = end.min(samples - line.lag_at(samples - line.lag_at(samples)));
+            first = first.max(-lags.at(-lags.at(0.0)));
+            end = end.min(samples - lags.at(samples - lags.at(samples)));
         }
         let frames = (end - first).max(0.0) as usize;
         enough(frames)?;
-        let lines = || lines.iter().flatten();
-        let fastest = lines().map(|line| line.rate.abs()).fold(0.0, f64::max);
+        let fastest = lags.iter().map(|lags| lags.rate.abs()).fold(0.0, f64::max);
         let by_drift = ((DRIFT_OF_PIECE / fastest) as usize).clamp(SHORT_PIECE, LONGEST_PIECE);
         let length = 1 << by_drift.min(frames / LEAST_PIECES).max(SHORTEST_PIECE).ilog2();
-        let error = lines().map(|line| line.error(first, end)).fold(0.0, f64::max);
-        Ok(Self { first, end, length, margin: error.ceil() as usize })
+        Ok(Self { first, end, length })
     }
 
     /// The first samples of all pieces.

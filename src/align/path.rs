@@ -35,8 +35,9 @@ const MOST_NEAR: f64 = 1.5;
 
 /// Share of the pieces that agree, at least.
 const LEAST_SHARE: f64 = 0.5;
-/// Pieces between those whose lags give the rate.
+/// Pieces between those whose lags give the rate: many of all would have steps between them.
 const RATE_PIECES: usize = 16;
+const PIECES_PER_RATE: usize = 64;
 
 /// Median of the absolute values of a normal law, in its deviations.
 const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
@@ -55,6 +56,8 @@ pub(super) struct Path {
     pub(super) rate: f64,
     /// By how many samples lags of pieces in a row differ at most.
     pub(super) near: f64,
+    /// -1 for the opposite polarity.
+    pub(super) sign: f64,
 }
 
 /// Most pieces agree with no line, or not with those beside them.
@@ -171,7 +174,8 @@ impl<'a> Search<'a> {
         let lag = |piece: usize| self.lags[path[piece]][piece].as_ref();
         let there: Vec<usize> = (0..path.len()).filter(|piece| lag(*piece).is_some()).collect();
         let known = |piece: usize| {
-            let (at, lag) = (self.centre(piece), lag(piece).filter(|lag| lag.odds >= ON_LINE_ODDS)?);
+            let (at, lag) =
+                (self.centre(piece), lag(piece).filter(|lag| lag.odds >= ON_LINE_ODDS && lag.is_alone)?);
             Some((piece, Known { at, lag: self.lines[path[piece]].lag_at(at) + lag.beyond }))
         };
         let found: Vec<(usize, Known)> = there.iter().filter_map(|piece| known(*piece)).collect();
@@ -190,13 +194,15 @@ impl<'a> Search<'a> {
         if found.len() < 2 || agreeing < LEAST_SHARE * level(&mut there.iter().copied()) {
             return Err(Disagree { agreeing: found.len(), pieces: there.len() });
         }
-        Ok(Path { known: found.into_iter().map(|found| found.1).collect(), rate, near })
+        let heights = found.iter().filter_map(|found| lag(found.0)).map(|lag| lag.height);
+        let sign = heights.sum::<f64>().signum();
+        Ok(Path { known: found.into_iter().map(|found| found.1).collect(), rate, near, sign })
     }
 }
 
 /// The slope that most pairs of pieces some way apart have.
 fn rate(known: &[Known]) -> f64 {
-    let apart = RATE_PIECES.min(known.len() / 4).max(1);
+    let apart = (known.len() / PIECES_PER_RATE).clamp(1, RATE_PIECES);
     let slope = |pair: (&Known, &Known)| (pair.1.lag - pair.0.lag) / (pair.1.at - pair.0.at);
     median(known.iter().zip(known.iter().skip(apart)).map(slope).collect())
 }

@@ -24,8 +24,48 @@ pub(super) struct Placed {
     /// Lost samples are NaN.
     pub(super) record: Record,
     pub(super) steps: Vec<Step>,
-    /// Near all lags of its samples; none of the reference.
-    pub(super) line: Option<LagLine>,
+    pub(super) lags: Lags,
+}
+
+/// The lags of a recording whose steps are mended, over the samples of the reference.
+#[derive(Debug, Clone)]
+pub(super) struct Lags {
+    /// At least two.
+    known: Vec<Known>,
+    /// By how much they grow per sample: the slope of the line of least squares.
+    pub(super) rate: f64,
+    /// -1 for the opposite polarity.
+    pub(super) sign: f64,
+}
+
+impl Lags {
+    fn new(path: Path, jumps: &[Jump]) -> Self {
+        let lost =
+            |at: f64| jumps.iter().filter(|jump| jump.after.at <= at).map(|jump| jump.lost).sum::<i64>();
+        let whole = |known: &Known| Known { lag: known.lag + lost(known.at) as f64, ..*known };
+        let known: Vec<Known> = path.known.iter().map(whole).collect();
+        let mean = |of: fn(&Known) -> f64| known.iter().map(of).sum::<f64>() / known.len() as f64;
+        let (at, lag) = (mean(|known| known.at), mean(|known| known.lag));
+        let squares: f64 = known.iter().map(|known| (known.at - at).powi(2)).sum();
+        let rate = known.iter().map(|known| (known.at - at) * (known.lag - lag)).sum::<f64>() / squares;
+        Self { known, rate, sign: path.sign }
+    }
+
+    /// Of the reference itself.
+    pub(super) fn none() -> Self {
+        Self { known: [0.0, 1.0].map(|at| Known { at, lag: 0.0 }).to_vec(), rate: 0.0, sign: 1.0 }
+    }
+
+    /// The lag at a sample of the reference: on the line between two pieces, and on that of all beyond them.
+    pub(super) fn at(&self, sample: f64) -> f64 {
+        let right = self.known.partition_point(|known| known.at <= sample);
+        let (left, right) = (self.known.get(right.wrapping_sub(1)), self.known.get(right));
+        match (left, right) {
+            (Some(a), Some(b)) => a.lag + (b.lag - a.lag) * (sample - a.at) / (b.at - a.at),
+            (Some(known), None) | (None, Some(known)) => known.lag + self.rate * (sample - known.at),
+            (None, None) => 0.0,
+        }
+    }
 }
 
 /// The lags before a step and after it.
@@ -50,7 +90,7 @@ pub(super) fn mended(reference: &Record, other: &Record, line: LagLine) -> Resul
         keep: spliced(&other.keep, &steps, false),
         clipped: other.clipped,
     };
-    Ok(Placed { record, steps, line: Some(line_of(&path, &jumps)) })
+    Ok(Placed { record, steps, lags: Lags::new(path, &jumps) })
 }
 
 /// The samples of a recording without its steps: a filler takes the place of those that are lost, or that
@@ -69,7 +109,7 @@ pub(super) fn spliced<T: Copy>(samples: &[T], steps: &[Step], filler: T) -> Vec<
 
 /// Where lags of pieces in a row differ by more than clocks do.
 fn jumps(path: &Path) -> Vec<Jump> {
-    let Path { known, rate, near } = path;
+    let Path { known, rate, near, .. } = path;
     let beyond: Vec<f64> = known.iter().map(|known| known.lag - rate * known.at).collect();
     let is_jump = |k: &usize| {
         let apart = known[*k].at - known[k - 1].at;
@@ -87,20 +127,6 @@ fn jumps(path: &Path) -> Vec<Jump> {
         Jump { before, after, lost: -(grown.round() as i64) }
     };
     cuts.windows(3).map(jump).filter(|jump| jump.lost != 0).collect()
-}
-
-/// The line of least squares through the lags without the jumps; its error holds all of them.
-fn line_of(path: &Path, jumps: &[Jump]) -> LagLine {
-    let lost = |at: f64| jumps.iter().filter(|jump| jump.after.at <= at).map(|jump| jump.lost).sum::<i64>();
-    let all: Vec<Known> =
-        path.known.iter().map(|known| Known { lag: known.lag + lost(known.at) as f64, ..*known }).collect();
-    let mean = |of: fn(&Known) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
-    let (at, lag) = (mean(|known| known.at), mean(|known| known.lag));
-    let squares: f64 = all.iter().map(|known| (known.at - at).powi(2)).sum();
-    let rate = all.iter().map(|known| (known.at - at) * (known.lag - lag)).sum::<f64>() / squares;
-    let miss = |known: &Known| (known.lag - lag - rate * (known.at - at)).abs();
-    let most = all.iter().map(miss).fold(0.0, f64::max);
-    LagLine::new(at, lag, rate, most / (0.5 * (all[all.len() - 1].at - all[0].at)))
 }
 
 /// A jump with its place: from sample `begin` of the recording on, the first sample after those of the one

@@ -257,13 +257,13 @@ fn intervals_are_those_of_the_errors() {
     let (mut within, mut all) = (0, 0);
     for draw in 0..40 {
         let (ppm, decibels) = (20.0 * (draw % 2) as f64, 40.0 + 50.0 * draw as f64 / 39.0);
-        let found = aligned(&scene(ppm, decibels, 50_000, 100 + draw)).unwrap();
+        let found = aligned(&scene(ppm, decibels, 64_000, 100 + draw)).unwrap();
         let (clock, rate) = (found.instants(1), 1.0 + 1e-6 * ppm);
         let mut add = |miss: f64, sigma: f64| {
             all += 1;
             within += i32::from(miss.abs() <= HALF_WIDTH * sigma);
         };
-        for k in [1000.0, 15_000.0, 25_000.0, 35_000.0, 48_000.0] {
+        for k in [1000.0, 20_000.0, 32_000.0, 45_000.0, 62_000.0] {
             add(clock.at(k) - LATE - k / rate, clock.deviation(k));
         }
         let AlignedChannel { drift, gain, offset, .. } = found.channels[1];

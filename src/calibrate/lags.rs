@@ -30,6 +30,9 @@ const NEIGHBOURS: f64 = 16.0;
 const MOST_DRIFT: f64 = 2.2e-3;
 /// Log-odds against chance from which on lags count as found.
 const LEAST_ODDS: f64 = 30.0;
+/// With less the lags of other probes, which samples that are lost explain, are to be less likely: the best of
+/// many lines has high odds by chance.
+const CERTAIN_ODDS: f64 = 120.0;
 /// Other lags with this share of the log-odds of the best ones explain the recordings as well: voices that
 /// say different things correlate far beyond chance, but at many lags.
 const ALIKE_ODDS_SHARE: f64 = 0.5;
@@ -249,17 +252,12 @@ pub(crate) struct LagLine {
     at: f64,
     lag: f64,
     /// Samples per sample.
-    pub(crate) rate: f64,
+    rate: f64,
     /// Standard error of the rate, or what it may be at most where one probe alone was found.
     rate_error: f64,
 }
 
 impl LagLine {
-    /// Through a lag at a sample of the reference, with a rate and by how much that may be wrong.
-    pub(crate) fn new(at: f64, lag: f64, rate: f64, rate_error: f64) -> Self {
-        Self { at, lag, rate, rate_error }
-    }
-
     /// The line parallel to this one on which some samples of the reference lie in `other`, if one lag
     /// stands out.
     pub(crate) fn parallel(&self, reference: &Record, other: &Record, samples: Range<usize>) -> Option<Self> {
@@ -274,11 +272,8 @@ impl LagLine {
         found.sort_by(|a, b| b.height.total_cmp(&a.height));
         let best = found.first().filter(|best| odds(&[**best]) >= LEAST_ODDS)?;
         let is_alike = |other: &&Lag| other.height >= ALIKE_WITHIN_PITCH * best.height;
-        (found.iter().filter(is_alike).count() == 1).then(|| Self {
-            at: best.at,
-            lag: best.lag + begin as f64,
-            ..*self
-        })
+        let line = Self { at: best.at, lag: best.lag + begin as f64, ..*self };
+        (found.iter().filter(is_alike).count() == 1).then_some(line)
     }
 
     /// The lag at a sample of the reference.
@@ -317,22 +312,26 @@ pub(crate) fn line(reference: &Record, other: &Record, within: f64) -> Result<La
 /// The line on which most of the likely lags lie.
 fn likeliest(lags: &[Lag]) -> Result<LagLine, Vec<i64>> {
     let Some(&(best, line)) = lines(lags).first() else { return Err(Vec::new()) };
-    // Where samples were lost other probes have other lags. A lag is in doubt where its own probes have more.
-    let probes: Vec<usize> = on(&line, lags).iter().map(|lag| lag.probe).collect();
-    let is_other = |lag: &&Lag| !line.holds(lag) && probes.contains(&lag.probe);
-    let others: Vec<Lag> = lags.iter().filter(is_other).copied().collect();
+    // Where samples were lost other probes have other lags: a lag is in doubt where its own probes have more.
+    let own = on(&line, lags);
+    let beyond = |lag: &Lag| lag.lag - line.lag_at(lag.at);
+    let is_rival = |lag: &Lag, own: &Lag| {
+        let share = if beyond(lag).abs() <= PITCH_SAMPLES { ALIKE_WITHIN_PITCH } else { ALIKE_ODDS_SHARE };
+        lag.probe == own.probe && !line.holds(lag) && lag.sigmas.powi(2) >= share * own.sigmas.powi(2)
+    };
+    let in_doubt = own.iter().filter(|own| lags.iter().any(|lag| is_rival(lag, own))).count();
+    let others: Vec<Lag> = lags.iter().filter(|lag| !line.holds(lag)).copied().collect();
+    let is_likely = |(odds, _): &(f64, LagLine)| *odds >= ALIKE_ODDS_SHARE * best;
+    let is_chance = best < CERTAIN_ODDS && lines(&others).first().is_some_and(is_likely);
+    if best >= LEAST_ODDS && !is_chance && 2 * in_doubt < own.len() {
+        return Ok(fitted(&own));
+    }
     let mut alike = vec![line.lag];
-    for (odds, other) in lines(&others) {
-        let lag = other.lag_at(line.at);
-        let is_new = alike.iter().all(|known| (known - lag).abs() > 2.0 * NEIGHBOURS);
-        let is_within_pitch = (lag - line.lag).abs() <= PITCH_SAMPLES;
-        let share = if is_within_pitch { ALIKE_WITHIN_PITCH } else { ALIKE_ODDS_SHARE };
-        if is_new && (odds >= share * best || best < LEAST_ODDS) {
+    for rival in lags.iter().filter(|lag| own.iter().any(|own| is_rival(lag, own))) {
+        let lag = line.lag + beyond(rival);
+        if alike.iter().all(|known| (known - lag).abs() > 2.0 * NEIGHBOURS) {
             alike.push(lag);
         }
-    }
-    if best >= LEAST_ODDS && alike.len() == 1 {
-        return Ok(fitted(&on(&line, lags)));
     }
     // A signal that repeats correlates with itself at many lags, none of which stands out.
     let highest = lags.iter().map(|lag| lag.height).fold(0.0, f64::max);
