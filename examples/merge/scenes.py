@@ -86,7 +86,7 @@ SCENES = {
     "two rates": ("music", 20e3, [Recorder(44_100, 0.3), Recorder(48_000, 0.9, -15, 0.8)], 96_000),
     "dropout": ("speech", 18e3, [Recorder(24_000, 0.5), Recorder(24_000, 0.8, 8, lost=(120_000, 120_700))], 48_000),
     "three recorders": (
-        "noise", 24e3,
+        "music", 20e3,
         [Recorder(24_000, 0.5), Recorder(24_000, 0.7, 12, 0.9), Recorder(24_000, 0.1, -31, -1.1)], 72_000,
     ),
     "drift turns round": ("music", 18e3, [Recorder(24_000, 0.5), Recorder(24_000, 0.9, 0, 0.7, bend=40)], 48_000),

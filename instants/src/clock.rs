@@ -1,6 +1,7 @@
 //! When the samples of a recording were taken.
 
 use hybank_core::units::FastPeriods;
+use std::ops::Range;
 
 /// The instants of the samples of one recording: a line through knots, which may be as few as two, for an
 /// even clock, or as many as the samples, for time stamps.
@@ -74,16 +75,15 @@ impl Clock {
     }
 
     /// Fast periods from one sample to the next, around a sample.
-    pub fn period_at(&self, sample: f64) -> f64 {
+    fn period_at(&self, sample: f64) -> f64 {
         let k = segment(&self.samples, sample);
         (self.instants[k + 1] - self.instants[k]) / (self.samples[k + 1] - self.samples[k])
     }
 
-    /// The longest and the shortest period among `count` samples.
-    pub fn periods(&self, count: usize) -> (f64, f64) {
-        let last = segment(&self.samples, count.saturating_sub(1) as f64);
-        let periods = (segment(&self.samples, 0.0)..=last).map(|k| self.period_at(self.samples[k]));
-        periods.fold((0.0, f64::INFINITY), |(most, least), period| (most.max(period), least.min(period)))
+    /// The periods between knots, as far as `samples` reach.
+    pub(super) fn periods(&self, samples: Range<f64>) -> impl Iterator<Item = f64> {
+        let [first, last] = [samples.start, samples.end].map(|sample| segment(&self.samples, sample));
+        (first..=last).map(|k| self.period_at(self.samples[k]))
     }
 }
 
@@ -110,8 +110,8 @@ mod tests {
             assert!((clock.sample_at(clock.at(sample)) - sample).abs() < 1e-12);
         }
         assert_eq!((clock.at(10.0), clock.at(12.0)), (FastPeriods(23.5), FastPeriods(56.5)));
-        assert_eq!(clock.periods(10), (2.05, 2.05));
-        assert_eq!(clock.periods(12), (16.5, 2.05));
+        let periods = |samples| clock.periods(samples).collect::<Vec<_>>();
+        assert_eq!((periods(2.0..9.0), periods(2.0..11.0)), (vec![2.05], vec![2.05, 16.5]));
     }
 
     #[test]

@@ -11,6 +11,8 @@ use std::ops::Range;
 
 /// Frames of a block, for which one error is stated.
 const FRAMES_PER_BLOCK: usize = 64;
+/// Outputs that share a set of samples where instants have no pattern.
+const OUTPUTS_ON_DEMAND: usize = 64;
 /// Most blocks of a stretch, whose frames share the numbers of their samples.
 const MOST_BLOCKS: usize = 64;
 /// Periods by which the samples of a stretch may drift.
@@ -35,7 +37,7 @@ pub struct FusionSettings {
 impl FusionSettings {
     /// The longest time that the covariances for [`fuse`] should know.
     pub fn longest(&self, recordings: &[Recording]) -> FastPeriods {
-        let period = recordings.iter().map(Recording::mean_period).fold(0.0, f64::max);
+        let period = recordings.iter().map(Recording::period).fold(0.0, f64::max);
         FastPeriods(SLACK * 2.0 * (self.reach + 1) as f64 * period) + LONGEST_BLOCK
     }
 }
@@ -117,26 +119,32 @@ pub fn fuse(
     Ok(Fused { samples, errors, block: FRAMES_PER_BLOCK * grid.ratio })
 }
 
-/// The fast periods in a period of all recordings, if that is one integer.
+/// The fast periods in the usual period of all recordings, if that is one integer.
 fn common_ratio(recordings: &[Recording]) -> Option<usize> {
-    let (most, _) = recordings.first()?.clock().periods(recordings.first()?.samples().len());
-    let ratio = most.round();
-    let is_near = |recording: &Recording| {
-        let (most, least) = recording.clock().periods(recording.samples().len());
-        (most / ratio - 1.0).abs() < SAME_RATE && (least / ratio - 1.0).abs() < SAME_RATE
-    };
-    (ratio >= 1.0 && recordings.iter().all(is_near)).then_some(ratio as usize)
+    let ratio = recordings.first()?.period().round();
+    let is_common =
+        ratio >= 1.0 && recordings.iter().all(|recording| is_near(recording.period(), ratio as usize));
+    is_common.then_some(ratio as usize)
 }
 
-/// Blocks over which no clock drifts too far.
+fn is_near(period: f64, ratio: usize) -> bool {
+    (period / ratio as f64 - 1.0).abs() < SAME_RATE
+}
+
+/// Blocks over which no clock drifts too far, but for steps.
 fn blocks_of_stretch(recordings: &[Recording], ratio: usize) -> usize {
-    let drift = |recording: &Recording| {
-        let (most, least) = recording.clock().periods(recording.samples().len());
-        (most / ratio as f64 - 1.0).abs().max((least / ratio as f64 - 1.0).abs())
-    };
-    let fastest = recordings.iter().map(drift).fold(0.0, f64::max);
+    let periods = recordings.iter().flat_map(Recording::periods).filter(|period| is_near(*period, ratio));
+    let fastest = periods.map(|period| (period / ratio as f64 - 1.0).abs()).fold(0.0, f64::max);
     let blocks = (MOST_DRIFT / (fastest * FRAMES_PER_BLOCK as f64)) as usize;
     1 << blocks.clamp(1, MOST_BLOCKS).ilog2()
+}
+
+/// Whether the samples around these frames come at nearly their common rate.
+fn is_even(recording: &Recording, grid: Grid, reach: usize, frames: &Range<usize>) -> bool {
+    let [first, last] =
+        [frames.start, frames.end].map(|frame| recording.clock().sample_at(grid.frame(frame)));
+    let reach = (reach + 1) as f64;
+    recording.clock().periods(first - reach..last + reach).all(|period| is_near(period, grid.ratio))
 }
 
 fn on_knots(
@@ -146,6 +154,9 @@ fn on_knots(
     reach: usize,
     frames: Range<usize>,
 ) -> Result<Part, LinalgError> {
+    if !recordings.iter().all(|recording| is_even(recording, grid, reach, &frames)) {
+        return on_demand(estimator, recordings, grid, reach, frames);
+    }
     let stretch = Stretch::new(estimator, recordings, grid, reach, frames.clone())?;
     let (mut outputs, mut errors) = (Vec::with_capacity(frames.len() * grid.ratio), Vec::new());
     for (frame, found) in stretch.frames() {
@@ -172,6 +183,13 @@ fn on_demand(
     reach: usize,
     frames: Range<usize>,
 ) -> Result<Part, LinalgError> {
-    let found = demand::block(estimator, recordings, reach, &grid.instants(frames))?;
-    Ok((found.outputs, vec![found.error]))
+    let (mut outputs, mut errors) = (Vec::with_capacity(frames.len() * grid.ratio), Vec::new());
+    for block in grid.instants(frames).chunks(FRAMES_PER_BLOCK * grid.ratio) {
+        let parts =
+            block.chunks(OUTPUTS_ON_DEMAND).map(|part| demand::block(estimator, recordings, reach, part));
+        let parts = parts.collect::<Result<Vec<_>, _>>()?;
+        errors.push(mean(&parts.iter().map(|part| part.error).collect::<Vec<_>>()));
+        outputs.extend(parts.into_iter().flat_map(|part| part.outputs));
+    }
+    Ok((outputs, errors))
 }

@@ -86,10 +86,16 @@ impl Recording {
         numbers
     }
 
-    /// Fast periods from one sample to the next, in the mean.
-    pub(super) fn mean_period(&self) -> f64 {
-        let span = self.span();
-        (span.end - span.start).0 / self.samples.len().saturating_sub(1).max(1) as f64
+    /// The periods of its clock between knots.
+    pub(super) fn periods(&self) -> Vec<f64> {
+        self.clock.periods(0.0..self.samples.len().saturating_sub(1) as f64).collect()
+    }
+
+    /// The usual period.
+    pub(super) fn period(&self) -> f64 {
+        let mut periods = self.periods();
+        let middle = periods.len() / 2;
+        *periods.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 }
 

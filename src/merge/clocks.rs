@@ -175,8 +175,10 @@ fn place(source: &Source, alignment: &Alignment, number: usize, own: Hertz, rati
         let end = scaled(step.samples.end).min(samples.len());
         samples[scaled(step.samples.start).min(end)..end].fill(f64::NAN);
     }
-    let beside =
-        course.steps().iter().flat_map(|step| [scaled(step.samples.start), scaled(step.samples.end)]);
+    let beside = course
+        .steps()
+        .iter()
+        .flat_map(|step| [scaled(step.samples.start).saturating_sub(1), scaled(step.samples.end)]);
     let mut knots: Vec<usize> =
         (0..samples.len()).step_by(KNOT_EVERY).chain(beside).chain([samples.len()]).collect();
     knots.sort_unstable();
