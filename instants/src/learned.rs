@@ -30,7 +30,7 @@ pub fn learned(signal: &[f64], parts: &[Range<usize>], longest: FastPeriods) -> 
     // The powers of both signs of a frequency are together; the squares of the window have the mean 3/8.
     let power = (2.0 * density.iter().sum::<f64>() - density[0] - density[SEGMENT / 2])
         / (count as f64 * (SEGMENT * SEGMENT) as f64 * 0.375);
-    if !(power > 0.0) {
+    if power.is_nan() || power <= 0.0 {
         return None;
     }
     let most = density.iter().copied().fold(0.0, f64::max);
@@ -39,7 +39,7 @@ pub fn learned(signal: &[f64], parts: &[Range<usize>], longest: FastPeriods) -> 
         let beside = &logarithms[k.saturating_sub(BESIDE)..(k + BESIDE + 1).min(logarithms.len())];
         (beside.iter().sum::<f64>() / beside.len() as f64).exp()
     };
-    let edge = |k: f64| CyclesPerFastPeriod(((k / SEGMENT as f64).max(0.0)).min(0.5));
+    let edge = |k: f64| CyclesPerFastPeriod((k / SEGMENT as f64).clamp(0.0, 0.5));
     let bins = (0..logarithms.len()).map(|k| (edge(k as f64 - 0.5)..edge(k as f64 + 0.5), smooth(k)));
     Some((Spectrum::of_pieces(bins, longest), power))
 }

@@ -195,7 +195,7 @@ impl Model {
                 loop {
                     let candidate = (best * step).clamp(least, most.max(least));
                     let found = if candidate == best { f64::INFINITY } else { misfit(candidate)? };
-                    if !(found < least_misfit) {
+                    if found.is_nan() || found >= least_misfit {
                         break;
                     }
                     (best, least_misfit) = (candidate, found);

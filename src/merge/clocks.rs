@@ -142,7 +142,7 @@ fn by_alignment(sources: &[Source], rate: Hertz, within: Option<Seconds>) -> Res
             AlignWarning::FixedTaps { .. } | AlignWarning::Coincidence { .. } | AlignWarning::Values(_)
         )
     };
-    let warnings = alignment.warnings.iter().cloned().filter(|warning| !is_of_fixed(warning));
+    let warnings = alignment.warnings.iter().filter(|warning| !is_of_fixed(warning)).cloned();
     Ok(Placed {
         recordings,
         found,

@@ -1,1 +1,84 @@
+//! Recordings of sums of cosines, which are exact at any instant.
 
+use super::{MergeError, MergeSettings, Merged, Source, merge};
+use crate::calibrate::Record;
+use crate::random::Random;
+use crate::units::{Hertz, Seconds};
+use std::f64::consts::TAU;
+
+const SETTINGS: MergeSettings = MergeSettings { rate: None, band: None, learn: true, within: None };
+
+/// Lines up to 3.2 kHz, too many to repeat in a recording.
+fn sound(t: f64) -> f64 {
+    let line = |q: u32| {
+        let frequency = 60.0 + 3140.0 * (f64::from(q) * 0.618_033_988_75).fract();
+        (TAU * frequency * t + 2.3 * f64::from(q * q)).cos()
+    };
+    0.02 * (0..120).map(line).sum::<f64>()
+}
+
+fn source(name: &str, gain: f64, instants: impl Iterator<Item = f64>, seed: u64) -> Source {
+    let mut random = Random(seed);
+    let samples = instants.map(|t| gain * sound(t) + 2e-5 * random.sample()).collect();
+    Source {
+        name: name.to_owned(),
+        record: Record::new(samples),
+        rate: Hertz(4000.0),
+        step: 0.0,
+        stamps: None,
+    }
+}
+
+fn snr(merged: &Merged, begin: f64) -> f64 {
+    let inner = 400..merged.samples.len() - 400;
+    let (mut signal, mut error) = (0.0, 0.0);
+    for n in inner {
+        let truth = sound(begin + merged.begin.0 + n as f64 / merged.rate.0);
+        signal += truth * truth;
+        error += (merged.samples[n] - truth).powi(2);
+    }
+    10.0 * (signal / error).log10()
+}
+
+/// Two recorders of 4 kHz, begun apart, one of them inverted and 35 ppm fast, resolve 3.2 kHz together.
+#[test]
+fn two_recorders_resolve_what_none_of_them_does() {
+    let first = source("a", 1.0, (0..24_000).map(|k| 0.3 + f64::from(k) / 4000.0), 1);
+    let second = source("b", -0.6, (0..24_000).map(|k| 0.1 + f64::from(k) / 4000.0 / (1.0 + 35e-6)), 2);
+    let merged = merge(&[first, second], SETTINGS).unwrap();
+    assert_eq!(merged.rate, Hertz(8000.0));
+    let found = &merged.sources[1];
+    assert!((found.start.0 + 0.2).abs() < 1e-6, "{found:?}");
+    let (drift, gain) = (found.drift.unwrap().value, found.gain.unwrap().value);
+    assert!((drift - 35e-6).abs() < 1e-7 && (gain + 0.6).abs() < 1e-3, "{found:?}");
+    let measured = snr(&merged, 0.3);
+    assert!(
+        measured > 25.0 && merged.quality.alone.iter().all(|alone| alone.0 < 15.0),
+        "{measured} {:?}",
+        merged.quality
+    );
+    assert!(merged.quality.sufficient().is_none());
+}
+
+/// Stamps off by up to 30 % of their period are fused as they are.
+#[test]
+fn stamps_say_when_samples_were_taken() {
+    let mut random = Random(5);
+    let stamps: Vec<f64> = (0..8000).map(|k| (f64::from(k) + 0.3 * random.sample()) / 8000.0).collect();
+    let mut logger = source("logger", 1.0, stamps.iter().copied(), 3);
+    (logger.rate, logger.stamps) = (Hertz(8000.0), Some(stamps.iter().copied().map(Seconds).collect()));
+    let merged = merge(std::slice::from_ref(&logger), SETTINGS).unwrap();
+    let measured = snr(&merged, stamps[0]);
+    assert!(
+        measured > 55.0 && (measured - merged.quality.snr.0).abs() < 3.0,
+        "{measured} {:?}",
+        merged.quality
+    );
+
+    let plain = Source { stamps: None, name: "plain".into(), ..logger.clone() };
+    let refused = merge(&[logger.clone(), plain], SETTINGS).unwrap_err();
+    assert!(matches!(refused, MergeError::SomeStamps { .. }), "{refused}");
+    let rate = MergeSettings { rate: Some(Hertz(1e9)), ..SETTINGS };
+    assert!(matches!(merge(&[logger], rate).unwrap_err(), MergeError::Rate { .. }));
+    assert!(matches!(merge(&[], SETTINGS).unwrap_err(), MergeError::NoSources));
+}

@@ -30,6 +30,7 @@ mod live;
 mod long_files;
 mod lost;
 mod measure;
+mod merge;
 mod messages;
 mod notes;
 #[cfg(unix)]

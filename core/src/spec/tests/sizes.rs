@@ -52,9 +52,10 @@ fn the_states_of_the_error_system_are_counted() {
     // The chain of the older of two samples.
     assert_eq!(recursive(1, 0, &[2046.0, 0.0]).refused_at(), "accepted");
     assert_eq!(recursive(1, 0, &[2047.0, 0.0]).refused_at(), "latency");
+    // What the least squares of one output sample hold.
     let fir = |design| Sizes { ratio: 2, latency: Some(0), delays: vec![0.0, 1.0], design };
-    assert_eq!(fir("method = \"h2\", taps = 4094").refused_at(), "accepted");
-    assert_eq!(fir("method = \"h2\", taps = 4095").refused_at(), "design.taps");
+    assert_eq!(fir("method = \"h2\", taps = 2048").refused_at(), "accepted");
+    assert_eq!(fir("method = \"h2\", taps = 2049").refused_at(), "design.taps");
 }
 
 #[test]
