@@ -20,11 +20,16 @@ const TRIALS: usize = 64;
 const FIRST_NOISES: [f64; 3] = [1e-3, 1e-5, 1e-7];
 /// Bands that are tried: parts of half of the output's rate.
 const BANDS: std::ops::RangeInclusive<u32> = 3..=16;
-/// The density beyond the band over that within, before the spectrum is learned: 30 dB below. What is there
-/// is told from what is not.
-const BEYOND: f64 = 1e-3;
-/// By what the variance of the noise changes from trial to trial, coarse to fine: 10, 3 and 1 dB.
-const FACTORS: [f64; 3] = [10.0, 1.995_262_314_968_879_6, 1.258_925_411_794_167_2];
+/// The density beyond the band over that within, before the spectrum is learned: so little that noise is not
+/// taken for signal.
+const BEYOND: f64 = 1e-10;
+/// How far the noise may lie below the signal: recorders have no more.
+const DECADES: i32 = 12;
+/// Twice the gain of log-likelihood that says that a recording has a noise of its own: once in a hundred by
+/// chance.
+const SIGNIFICANT: f64 = 6.6;
+/// By what the variance of the noise changes from trial to trial after that: 3 and 1 dB.
+const FACTORS: [f64; 2] = [1.995_262_314_968_879_6, 1.258_925_411_794_167_2];
 
 /// A signal with its recorders, whose front ends are equal and flat.
 #[derive(Debug, Clone)]
@@ -62,7 +67,7 @@ impl Model {
     /// Samples that are left out and predicted from those around them judge a model, by their likelihood. So
     /// the band is chosen, and the noise of each recording. The estimate with a spectrum that is flat over the
     /// band then shows the spectrum (Welch), over the half of the run where the predicted error is least:
-    /// elsewhere what is not resolved would be taken for signal.
+    /// elsewhere what is not resolved would be taken for signal. The noise of the estimate is subtracted.
     ///
     /// # Errors
     /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
@@ -158,9 +163,22 @@ impl Model {
             all.iter().zip(good).filter(|(_, error)| *error <= median).map(|(fused, _)| &fused.samples);
         let signal: Vec<f64> = chosen.flatten().copied().collect();
         let ranges: Vec<_> = (0..signal.len() / count).map(|k| k * count..(k + 1) * count).collect();
-        Ok(learned(&signal, &ranges, longest))
+        Ok(learned(&signal, &ranges, self.noise_density(recordings), longest))
     }
 
+    /// Density of the noise of an estimate, where the signal is far above it: samples carry as much as their
+    /// gains and noises say, and as often as they come.
+    fn noise_density(&self, recordings: &[Recording]) -> f64 {
+        let converters = self.estimator.signals().converters();
+        let carried = |recording: &Recording| {
+            let gain = converters[recording.converter()].gain;
+            gain * gain / (self.noise[recording.converter()] * recording.period())
+        };
+        1.0 / recordings.iter().map(carried).sum::<f64>()
+    }
+
+    /// One level for all recordings, and then each of its own where that is significantly likelier: recordings
+    /// that have little in common tell hardly more than the sum of their noises.
     fn measure_noise(
         &mut self,
         recordings: &[Recording],
@@ -168,44 +186,76 @@ impl Model {
         settings: FusionSettings,
     ) -> Result<(), LinalgError> {
         let instants = instants(settings, TRIALS);
-        (0..recordings.len())
-            .try_for_each(|i| self.measure_noise_of(i, recordings, prior, settings.reach, &instants))
-    }
-
-    /// In steps of a decade first, and then finer.
-    fn measure_noise_of(
-        &mut self,
-        i: usize,
-        recordings: &[Recording],
-        prior: &Prior,
-        reach: usize,
-        instants: &[FastPeriods],
-    ) -> Result<(), LinalgError> {
-        let (least, most) = (prior.least_noise[i], self.power * prior.gains[i].powi(2));
-        let mut noise: Vec<f64> = self.noise.iter().map(|noise| noise / self.power).collect();
-        let mut misfit = |candidate: f64| -> Result<f64, LinalgError> {
-            noise[i] = candidate / self.power;
-            let estimator = Estimator::new(self.estimator.signals().with_noise(&noise));
-            Ok(misfit(&held_out(&estimator, recordings, reach, self.power, instants)?, self.power))
+        let full: Vec<f64> = prior.gains.iter().map(|gain| self.power * gain * gain).collect();
+        let bounded = |levels: &[f64]| -> Vec<f64> {
+            let all = levels.iter().zip(&full).zip(&prior.least_noise);
+            all.map(|((level, full), least)| (level * full).max(*least)).collect()
         };
-        let mut best = self.noise[i].clamp(least, most.max(least));
-        let mut least_misfit = misfit(best)?;
-        for factor in FACTORS {
-            for step in [factor, 1.0 / factor] {
-                loop {
-                    let candidate = (best * step).clamp(least, most.max(least));
-                    let found = if candidate == best { f64::INFINITY } else { misfit(candidate)? };
-                    if found.is_nan() || found >= least_misfit {
-                        break;
-                    }
-                    (best, least_misfit) = (candidate, found);
-                }
-            }
+        let misfit = |levels: &[f64]| -> Result<f64, LinalgError> {
+            let noise: Vec<f64> = bounded(levels).iter().map(|noise| noise / self.power).collect();
+            let estimator = Estimator::new(self.estimator.signals().with_noise(&noise));
+            Ok(misfit(&held_out(&estimator, recordings, settings.reach, self.power, &instants)?, self.power))
+        };
+        let all: Vec<usize> = (0..recordings.len()).collect();
+        let mut search = NoiseSearch { levels: vec![1.0; all.len()], misfit: f64::INFINITY };
+        search.decades(&misfit)?;
+        search.walk(&all, &misfit, 0.0)?;
+        for i in all {
+            search.walk(&[i], &misfit, SIGNIFICANT)?;
         }
-        self.noise[i] = best;
+        self.noise = bounded(&search.levels);
         let noise: Vec<f64> = self.noise.iter().map(|noise| noise / self.power).collect();
         self.estimator = Estimator::new(self.estimator.signals().with_noise(&noise));
         Ok(())
+    }
+}
+
+/// Noises, over the power of the signal in each recording, and how badly they predict.
+struct NoiseSearch {
+    levels: Vec<f64>,
+    misfit: f64,
+}
+
+type Misfit<'a> = &'a dyn Fn(&[f64]) -> Result<f64, LinalgError>;
+
+impl NoiseSearch {
+    /// The best decade for all: far below the right value the likelihood is flat, and a walk would stay there.
+    fn decades(&mut self, misfit: Misfit<'_>) -> Result<(), LinalgError> {
+        let count = self.levels.len();
+        for decade in 0..=DECADES {
+            self.take_if_better(vec![10.0_f64.powi(-decade); count], misfit, 0.0)?;
+        }
+        Ok(())
+    }
+
+    /// Walks with the levels of `some` together; the first step must be better by `gain`.
+    fn walk(&mut self, some: &[usize], misfit: Misfit<'_>, gain: f64) -> Result<(), LinalgError> {
+        for step in FACTORS.into_iter().flat_map(|factor| [factor, 1.0 / factor]) {
+            let mut gain = gain;
+            loop {
+                let mut levels = self.levels.clone();
+                some.iter().for_each(|&i| levels[i] *= step);
+                if !self.take_if_better(levels, misfit, gain)? {
+                    break;
+                }
+                gain = 0.0;
+            }
+        }
+        Ok(())
+    }
+
+    fn take_if_better(
+        &mut self,
+        levels: Vec<f64>,
+        misfit: Misfit<'_>,
+        gain: f64,
+    ) -> Result<bool, LinalgError> {
+        let found = misfit(&levels)?;
+        let is_better = found + gain < self.misfit;
+        if is_better {
+            (self.levels, self.misfit) = (levels, found);
+        }
+        Ok(is_better)
     }
 }
 

@@ -294,7 +294,7 @@ fn the_spectrum_is_that_of_the_signal() {
             state
         })
         .collect();
-    let (spectrum, power) = learned(&signal, &[0..60_000], FastPeriods(50.0)).unwrap();
+    let (spectrum, power) = learned(&signal, &[0..60_000], 0.0, FastPeriods(50.0)).unwrap();
     let variance = 1.0 / 3.0 / (1.0 - 0.81);
     assert!((power / variance - 1.0).abs() < 0.03, "{power} {variance}");
     let share = |f: f64| 1.0 / (Complex::from(1.0) - Complex::from_polar(0.9, -2.0 * PI * f)).norm_sqr();
@@ -307,6 +307,31 @@ fn the_spectrum_is_that_of_the_signal() {
         let exact: f64 = (0..count).map(|k| share((f64::from(k) + 0.5) / 10_000.0)).sum::<f64>() / total;
         assert!((below(f) - exact).abs() < 0.02, "{f}: {} {exact}", below(f));
     }
-    assert!(learned(&signal, &[0..300], FastPeriods(50.0)).is_none());
-    assert!(learned(&[0.0; 2000], &[0..2000], FastPeriods(50.0)).is_none());
+    assert!(learned(&signal, &[0..300], 0.0, FastPeriods(50.0)).is_none());
+    assert!(learned(&[0.0; 2000], &[0..2000], 0.0, FastPeriods(50.0)).is_none());
+}
+
+/// Band, spectrum and noise of recordings that say nothing of them.
+#[test]
+fn recordings_tell_their_noise_and_the_error_is_as_predicted() {
+    let (_, recordings) = drifting(31);
+    let prior = Prior {
+        band: None,
+        passes: 2,
+        gains: vec![1.0, -0.5],
+        gain_deviations: vec![0.0; 2],
+        delay_deviations: vec![FastPeriods(0.0); 2],
+        least_noise: vec![0.0; 2],
+    };
+    let settings = FusionSettings { first: FastPeriods(100.0), count: 5600, reach: 24 };
+    let model = Model::learn(&recordings, &prior, settings).unwrap();
+    for (noise, exact) in model.noise.iter().zip([1e-8, 0.25e-8]) {
+        assert!((0.5..2.0).contains(&(noise / exact)), "{:?}", model.noise);
+    }
+    let fused = fuse(&model.estimator, &recordings, settings).unwrap();
+    // Without the coincidence and the gap.
+    let predicted = fused.errors[20..43].iter().map(|error| error.total()).sum::<f64>() / 23.0;
+    let found = error_of(&fused, 100.0, 20 * 128..43 * 128);
+    let apart = decibels(found) - decibels(predicted);
+    assert!(apart.abs() < 1.0, "{} {}", decibels(found), decibels(predicted));
 }

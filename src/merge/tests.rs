@@ -11,7 +11,7 @@ const SETTINGS: MergeSettings = MergeSettings { rate: None, band: None, learn: t
 /// Lines up to 3.2 kHz, too many to repeat in a recording.
 fn sound(t: f64) -> f64 {
     let line = |q: u32| {
-        let frequency = 60.0 + 3140.0 * (f64::from(q) * 0.618_033_988_75).fract();
+        let frequency = 60.0 + 3140.0 * (43_758.545_3 * (12.989_8 * f64::from(q)).sin()).rem_euclid(1.0);
         (TAU * frequency * t + 2.3 * f64::from(q * q)).cos()
     };
     0.02 * (0..120).map(line).sum::<f64>()
