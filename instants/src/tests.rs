@@ -5,6 +5,7 @@ use crate::estimator::MeanSquare;
 use hybank_core::units::{CyclesPerFastPeriod, FastPeriods};
 use hybank_linalg::{Complex, Mat};
 use std::f64::consts::PI;
+use std::slice::from_ref;
 use trials::random::Random;
 
 /// A Butterworth filter of this order, `f` over its cut-off.
@@ -294,7 +295,7 @@ fn the_spectrum_is_that_of_the_signal() {
             state
         })
         .collect();
-    let (spectrum, power) = learned(&signal, &[0..60_000], 0.0, FastPeriods(50.0)).unwrap();
+    let (spectrum, power) = learned(&signal, from_ref(&(0..60_000)), 0.0, FastPeriods(50.0)).unwrap();
     let variance = 1.0 / 3.0 / (1.0 - 0.81);
     assert!((power / variance - 1.0).abs() < 0.03, "{power} {variance}");
     let share = |f: f64| 1.0 / (Complex::from(1.0) - Complex::from_polar(0.9, -2.0 * PI * f)).norm_sqr();
@@ -307,8 +308,8 @@ fn the_spectrum_is_that_of_the_signal() {
         let exact: f64 = (0..count).map(|k| share((f64::from(k) + 0.5) / 10_000.0)).sum::<f64>() / total;
         assert!((below(f) - exact).abs() < 0.02, "{f}: {} {exact}", below(f));
     }
-    assert!(learned(&signal, &[0..300], 0.0, FastPeriods(50.0)).is_none());
-    assert!(learned(&[0.0; 2000], &[0..2000], 0.0, FastPeriods(50.0)).is_none());
+    assert!(learned(&signal, from_ref(&(0..300)), 0.0, FastPeriods(50.0)).is_none());
+    assert!(learned(&[0.0; 2000], from_ref(&(0..2000)), 0.0, FastPeriods(50.0)).is_none());
 }
 
 /// Band, spectrum and noise of recordings that say nothing of them.
