@@ -306,7 +306,9 @@ pub(crate) fn line(reference: &Record, other: &Record, within: f64) -> Result<La
     });
     let best = |lags: &[Lag]| lines(lags).first().map_or(0.0, |(odds, _)| *odds);
     let [long, short] = &found;
-    likeliest(if best(long) >= best(short) { long } else { short })
+    let [first, second] = if best(long) >= best(short) { [long, short] } else { [short, long] };
+    // Claps are alike to short probes, and apart to longer ones.
+    likeliest(first).or_else(|alike| likeliest(second).map_err(|_| alike))
 }
 
 /// The line on which most of the likely lags lie.
@@ -323,7 +325,16 @@ fn likeliest(lags: &[Lag]) -> Result<LagLine, Vec<i64>> {
     let others: Vec<Lag> = lags.iter().filter(|lag| !line.holds(lag)).copied().collect();
     let is_likely = |(odds, _): &(f64, LagLine)| *odds >= ALIKE_ODDS_SHARE * best;
     let is_chance = best < CERTAIN_ODDS && lines(&others).first().is_some_and(is_likely);
-    if best >= LEAST_ODDS && !is_chance && 2 * in_doubt < own.len() {
+    // Sounds that are alike, as claps are, have other lags for each probe, but share one.
+    let is_beside = |other: &LagLine| {
+        let apart = (other.lag_at(line.at) - line.lag).abs();
+        let share = if apart <= PITCH_SAMPLES { ALIKE_WITHIN_PITCH } else { ALIKE_ODDS_SHARE };
+        (apart > 2.0 * NEIGHBOURS).then_some(share)
+    };
+    let is_alike =
+        |(odds, other): &(f64, LagLine)| is_beside(other).is_some_and(|share| *odds >= share * best);
+    let stands_out = !lines(&others).iter().any(is_alike);
+    if best >= LEAST_ODDS && (stands_out || !is_chance && 2 * in_doubt < own.len()) {
         return Ok(fitted(&own));
     }
     let mut alike = vec![line.lag];

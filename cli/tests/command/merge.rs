@@ -38,7 +38,7 @@ fn what_cannot_be_merged_is_refused() {
     let desk = Desk::empty();
     desk.write("logger.csv", logger());
     desk.write("back.csv", "t,x\n0,1\n1,2\n0.5,3\n");
-    desk.write("plain.csv", "1\n2\n3\n");
+    desk.write("plain.csv", "0.1\n0.2\n0.3\n");
     desk.refused(1, &["merge", "back.csv", "-o", "x.wav"], &["line 4", "sort the lines"]);
     desk.refused(
         1,
