@@ -220,7 +220,7 @@ fn a_sweep_that_folds_is_refused() {
     let simulated = ["simulate", "spec.toml", "-o", "c", "--samples", "153600", "--gain", "0.08"];
     let errors = ["--noise", "1e-4", "--delay-error", "0,-50.4ms", "--drift", "0,1.5", "--source", source];
     desk.good(&[&simulated[..], &errors].concat());
-    let parts = ["channels 1 and 2", "agree at several lags", "does not repeat"];
+    let parts = ["channels 1 and 2", "narrow band"];
     desk.refused(1, &["align", "spec.toml", "c/ch1.wav", "c/ch2.wav", "-o", "aligned.toml"], &parts);
 }
 
