@@ -211,8 +211,8 @@ fn a_slow_sweep_is_refused() {
     desk.refused(1, &[&ALIGN[..], &["--within", "100.1ms"]].concat(), &parts);
 }
 
-/// Of a sweep past half the recorders' rate each probe shows several lags: the drift was -22.1 +- 3.5 ppm where
-/// 1.5 is true.
+/// Of a sweep past half the recorders' rate each probe shows several lags: the drift was -22.1 +- 3.5 ppm
+/// where 1.5 is true.
 #[test]
 fn a_sweep_that_folds_is_refused() {
     let desk = Desk::with_spec(include_str!("../../../examples/recorders/spec.toml"));
