@@ -20,9 +20,9 @@ use std::path::{Path, PathBuf};
 /// Merges recordings of one event by several recorders or sensors into one
 ///
 /// Finds when each recording began, how its clock drifts, its polarity and gain; measures the spectrum of
-/// the signal and the noise; and estimates the signal at a higher rate from all samples at their own instants.
-/// The recorders have equal front ends, which are flat over the band of the signal. Lost samples are left
-/// out, and the clock of the first recording is that of the result.
+/// the signal and the noise; and estimates the signal at a higher rate from all samples at their own
+/// instants. The recorders have equal front ends, which are flat over the band of the signal. Lost samples
+/// are left out, and the clock of the first recording is that of the result.
 ///
 /// Tables whose first column is a time (time, t, time_ms, ..) are merged by these times, which need not be
 /// even; all of them count on one clock.

@@ -41,18 +41,15 @@ pub struct Taps {
 /// Estimates the target from any set of samples.
 ///
 /// ```
-/// use hybank_instants::{Converter, Estimator, Sample, Signals, Spectrum};
-/// use hybank_linalg::Complex;
-/// use hybank_core::units::{CyclesPerFastPeriod, FastPeriods};
-/// // Two converters of half the rate, band up to 0.375 cycles per fast period, no front ends.
-/// let band = CyclesPerFastPeriod(0.0)..CyclesPerFastPeriod(0.375);
-/// let spectrum = Spectrum::flat(band, FastPeriods(64.0));
-/// let converters = vec![Converter::exact(0, 1.0, 1e-8), Converter::exact(0, -0.5, 1e-8)];
-/// let signals = Signals::new(&spectrum, &[&|_| Complex::from(1.0)], 0, converters);
-/// let sample = |converter, n: i32, delay| Sample { converter, instant: FastPeriods(2.0 * f64::from(n) + delay) };
-/// let samples: Vec<Sample> = (-15..15).flat_map(|n| [sample(0, n, 0.0), sample(1, n, 0.8)]).collect();
-/// let taps = Estimator::new(signals).taps(&samples, &[FastPeriods(1.0)])?;
-/// assert!(taps.errors[0].total() < 1e-7);
+/// use hybank_instants::{Converter, Estimator, Sample, Signals, Spectrum}; use hybank_linalg::Complex; use
+/// hybank_core::units::{CyclesPerFastPeriod, FastPeriods}; // Two converters of half the rate, band up to
+/// 0.375 cycles per fast period, no front ends. let band =
+/// CyclesPerFastPeriod(0.0)..CyclesPerFastPeriod(0.375); let spectrum = Spectrum::flat(band,
+/// FastPeriods(64.0)); let converters = vec![Converter::exact(0, 1.0, 1e-8), Converter::exact(0, -0.5,
+/// 1e-8)]; let signals = Signals::new(&spectrum, &[&|_| Complex::from(1.0)], 0, converters); let sample =
+/// |converter, n: i32, delay| Sample { converter, instant: FastPeriods(2.0 * f64::from(n) + delay) }; let
+/// samples: Vec<Sample> = (-15..15).flat_map(|n| [sample(0, n, 0.0), sample(1, n, 0.8)]).collect(); let taps
+/// = Estimator::new(signals).taps(&samples, &[FastPeriods(1.0)])?; assert!(taps.errors[0].total() < 1e-7);
 /// # Ok::<(), hybank_linalg::LinalgError>(())
 /// ```
 #[derive(Debug, Clone)]

@@ -84,9 +84,10 @@ type Part = (Vec<f64>, Vec<MeanSquare>);
 /// Estimates the target at every output of a grid.
 ///
 /// Recorders of nearly one rate, that of an integer number of fast periods, share taps over many frames. For
-/// all others, and around lost samples, the samples of each block are taken for themselves. An output depends
-/// on the instants of the samples around it and on nothing else, so it has the same bits for any number of
-/// threads. Samples farther away than half of the [longest](super::Signals::longest) time are left out.
+/// all others, and around lost samples, the samples of each block are taken for themselves. An output
+/// depends on the instants of the samples around it and on nothing else, so it has the same bits for any
+/// number of threads. Samples farther away than half of the [longest](super::Signals::longest) time are left
+/// out.
 ///
 /// # Errors
 /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.

@@ -13,10 +13,10 @@ const BESIDE: usize = 2;
 /// The least density over the largest one.
 const FLOOR: f64 = 1e-10;
 
-/// Welch's estimate of the spectrum of `signal` over some of its `parts`, and the power there; `None` if none
-/// of these holds a segment. It is smoothed, because each segment has few degrees of freedom, and has a floor
-/// 100 dB below its largest density. `noise` is the density of noise in the signal, as power per cycle per
-/// fast period over both signs of frequency; it is subtracted.
+/// Welch's estimate of the spectrum of `signal` over some of its `parts`, and the power there; `None` if
+/// none of these holds a segment. It is smoothed, because each segment has few degrees of freedom, and has a
+/// floor 100 dB below its largest density. `noise` is the density of noise in the signal, as power per cycle
+/// per fast period over both signs of frequency; it is subtracted.
 pub fn learned(
     signal: &[f64],
     parts: &[Range<usize>],

@@ -16,7 +16,8 @@ const PARTS: usize = 128;
 const OUTPUTS_OF_PART: usize = 2048;
 /// Instants at which samples are left out, to measure the noise.
 const TRIALS: usize = 64;
-/// Noises that are tried with each band, over the power of the signal: as of recorders with 30, 50 and 70 dB.
+/// Noises that are tried with each band, over the power of the signal: as of recorders with 30, 50 and 70
+/// dB.
 const FIRST_NOISES: [f64; 3] = [1e-3, 1e-5, 1e-7];
 /// Bands that are tried: parts of half of the output's rate.
 const BANDS: std::ops::RangeInclusive<u32> = 3..=16;
@@ -65,9 +66,10 @@ impl Model {
     /// The model of `recordings`, which the converters 0, 1, .. made in their order.
     ///
     /// Samples that are left out and predicted from those around them judge a model, by their likelihood. So
-    /// the band is chosen, and the noise of each recording. The estimate with a spectrum that is flat over the
-    /// band then shows the spectrum (Welch), over the half of the run where the predicted error is least:
-    /// elsewhere what is not resolved would be taken for signal. The noise of the estimate is subtracted.
+    /// the band is chosen, and the noise of each recording. The estimate with a spectrum that is flat over
+    /// the band then shows the spectrum (Welch), over the half of the run where the predicted error is
+    /// least: elsewhere what is not resolved would be taken for signal. The noise of the estimate is
+    /// subtracted.
     ///
     /// # Errors
     /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
@@ -177,8 +179,8 @@ impl Model {
         1.0 / recordings.iter().map(carried).sum::<f64>()
     }
 
-    /// One level for all recordings, and then each of its own where that is significantly likelier: recordings
-    /// that have little in common tell hardly more than the sum of their noises.
+    /// One level for all recordings, and then each of its own where that is significantly likelier:
+    /// recordings that have little in common tell hardly more than the sum of their noises.
     fn measure_noise(
         &mut self,
         recordings: &[Recording],
@@ -219,7 +221,8 @@ struct NoiseSearch {
 type Misfit<'a> = &'a dyn Fn(&[f64]) -> Result<f64, LinalgError>;
 
 impl NoiseSearch {
-    /// The best decade for all: far below the right value the likelihood is flat, and a walk would stay there.
+    /// The best decade for all: far below the right value the likelihood is flat, and a walk would stay
+    /// there.
     fn decades(&mut self, misfit: Misfit<'_>) -> Result<(), LinalgError> {
         let count = self.levels.len();
         for decade in 0..=DECADES {

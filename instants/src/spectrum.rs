@@ -6,8 +6,8 @@ use std::ops::Range;
 
 /// Most cycles of e^{2 pi j f t} over a panel of eight nodes: the rule is exact to 2e-15 there.
 const CYCLES_PER_PANEL: f64 = 0.5;
-/// Fewest panels up to the highest frequency of all, half a cycle per fast period, for front ends that change
-/// on the way.
+/// Fewest panels up to the highest frequency of all, half a cycle per fast period, for front ends that
+/// change on the way.
 const LEAST_PANELS: f64 = 16.0;
 
 /// A frequency with its share of the power of the signal.

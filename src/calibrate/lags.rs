@@ -30,8 +30,8 @@ const NEIGHBOURS: f64 = 16.0;
 const MOST_DRIFT: f64 = 2.2e-3;
 /// Log-odds against chance from which on lags count as found.
 const LEAST_ODDS: f64 = 30.0;
-/// With less the lags of other probes, which samples that are lost explain, are to be less likely: the best of
-/// many lines has high odds by chance.
+/// With less the lags of other probes, which samples that are lost explain, are to be less likely: the best
+/// of many lines has high odds by chance.
 const CERTAIN_ODDS: f64 = 120.0;
 /// Other lags with this share of the log-odds of the best ones explain the recordings as well: voices that
 /// say different things correlate far beyond chance, but at many lags.
@@ -314,7 +314,8 @@ pub(crate) fn line(reference: &Record, other: &Record, within: f64) -> Result<La
 /// The line on which most of the likely lags lie.
 fn likeliest(lags: &[Lag]) -> Result<LagLine, Vec<i64>> {
     let Some(&(best, line)) = lines(lags).first() else { return Err(Vec::new()) };
-    // Where samples were lost other probes have other lags: a lag is in doubt where its own probes have more.
+    // Where samples were lost other probes have other lags: a lag is in doubt where its own probes have
+    // more.
     let own = on(&line, lags);
     let beyond = |lag: &Lag| lag.lag - line.lag_at(lag.at);
     let is_rival = |lag: &Lag, own: &Lag| {

@@ -1,9 +1,9 @@
 //! Covariances of the front ends' outputs for white noise of unit density at the analog input, and what
 //! jitter makes of them.
 //!
-//! With x the joint analog state and X its covariance, `c(t) = E[y(s + t) y(s)] = C e^{A t} X C'` for t >= 0,
-//! and c(-t) = c(t). Over a Gaussian time d an output changes by the mean square `2 (c(0) - E c(d))`. That
-//! is a sum over Gauss-Legendre panels that begin at the kink of c at t = 0.
+//! With x the joint analog state and X its covariance, `c(t) = E[y(s + t) y(s)] = C e^{A t} X C'` for t >=
+//! 0, and c(-t) = c(t). Over a Gaussian time d an output changes by the mean square `2 (c(0) - E c(d))`.
+//! That is a sum over Gauss-Legendre panels that begin at the kink of c at t = 0.
 
 use super::DesignError;
 use super::lifting::JointState;

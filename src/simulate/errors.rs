@@ -33,7 +33,8 @@ const MOST_CUTOFF_ERROR: f64 = 0.5;
 pub struct ConverterErrors {
     /// White noise on every sample, rms relative to full scale.
     pub noise: f64,
-    /// Samples are rounded to so many bits, 2 to 24, with full scale 1; those beyond it are clipped and counted.
+    /// Samples are rounded to so many bits, 2 to 24, with full scale 1; those beyond it are clipped and
+    /// counted.
     pub bits: Option<u32>,
     /// Aperture jitter: each sample is taken this much off its instant, rms.
     pub jitter: Option<Time>,
@@ -43,7 +44,8 @@ pub struct ConverterErrors {
     pub delay_error: Vec<Time>,
     /// Relative errors of the gains.
     pub gain_error: Vec<f64>,
-    /// Relative errors of the cut-offs of the front ends; of the stage that `fit` of the spec names, if it names one.
+    /// Relative errors of the cut-offs of the front ends; of the stage that `fit` of the spec names, if it
+    /// names one.
     pub cutoff_error: Vec<f64>,
     /// Offsets relative to full scale, added to those of the spec.
     pub offset: Vec<f64>,

@@ -7,8 +7,8 @@ const MAGNITUDE_32: u32 = u32::MAX >> 1;
 const MAGNITUDE_64: u64 = u64::MAX >> 1;
 
 impl PcmFormat {
-    /// The largest magnitude in `samples`, of full scale; 0 for none. The usual formats take one pass of whole
-    /// vectors.
+    /// The largest magnitude in `samples`, of full scale; 0 for none. The usual formats take one pass of
+    /// whole vectors.
     pub fn peak(self, samples: &[u8]) -> f64 {
         match self {
             Self::F32Le => {

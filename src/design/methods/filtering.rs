@@ -245,9 +245,9 @@ impl Innovations {
     }
 
     /// Mean squares of the errors of the references with the measurements up to their own slow period, and
-    /// with those of `periods.start()` to `periods.end()` further ones: it ends where the second half of them
-    /// lowered no square by more than the share `negligible`. `None` if the Riccati equation could not be
-    /// solved.
+    /// with those of `periods.start()` to `periods.end()` further ones: it ends where the second half of
+    /// them lowered no square by more than the share `negligible`. `None` if the Riccati equation could not
+    /// be solved.
     pub(in crate::design) fn smoothed(
         &self,
         periods: RangeInclusive<usize>,
