@@ -8,7 +8,7 @@ pub use hybank_core::{bank, files, io, messages, npy, pipeline, quantity, spec, 
 /// samples.
 pub use hybank_runtime as runtime;
 
-/// The crate `hybank-instants`: the signal behind samples at known instants.
+/// The crate `hybank-instants`: signals from samples at known instants.
 pub use hybank_instants as instants;
 
 /// The crate `hybank-linalg`: matrix decompositions and Fourier transforms.

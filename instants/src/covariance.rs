@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 const POINTS_PER_PERIOD: f64 = 48.0;
 /// Points of an interpolation, half of them on each side.
 const ORDER: usize = 12;
-/// Steps after which a phasor is computed anew, so that products do not collect rounding errors.
+/// Steps after which a phasor is computed again, so that products do not collect rounding errors.
 const RENEWAL: usize = 64;
 
 /// `c(t) = sum_q p_q Re(z_q e^{2 pi j f_q t})` for |t| up to a limit, tabulated.

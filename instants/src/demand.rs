@@ -1,7 +1,7 @@
 //! Instants without any pattern: the outputs of a block from all samples around it.
 
-use super::estimator::{Estimator, MeanSquare, Sample};
-use super::knots::mean;
+use super::around::Around;
+use super::estimator::{Estimator, MeanSquare};
 use super::recording::Recording;
 use hybank_core::units::FastPeriods;
 use hybank_linalg::{LinalgError, Mat};
@@ -13,7 +13,7 @@ const ERRORS: usize = 5;
 pub(super) const LONGEST_BLOCK: FastPeriods = FastPeriods(64.0);
 
 /// Outputs, and the mean of their errors.
-pub(super) struct Block {
+pub(super) struct Outputs {
     pub(super) outputs: Vec<f64>,
     pub(super) error: MeanSquare,
 }
@@ -25,27 +25,20 @@ pub(super) struct Block {
 ///
 /// # Errors
 /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
-pub(super) fn block(
+pub(super) fn outputs(
     estimator: &Estimator,
     recordings: &[Recording],
     reach: usize,
     instants: &[FastPeriods],
-) -> Result<Block, LinalgError> {
+) -> Result<Outputs, LinalgError> {
     let (Some(&origin), Some(&end)) = (instants.first(), instants.last()) else {
-        return Ok(Block { outputs: Vec::new(), error: MeanSquare { signal: 0.0, noise: 0.0 } });
+        return Ok(Outputs { outputs: Vec::new(), error: MeanSquare { signal: 0.0, noise: 0.0 } });
     };
     let within = (estimator.signals().longest() - LONGEST_BLOCK) * 0.5;
-    let (mut samples, mut values) = (Vec::new(), Vec::new());
-    for recording in recordings {
-        for number in recording.around(origin..end, reach, within) {
-            let sample = recording.sample(number as i64);
-            samples.push(Sample { instant: sample.instant - origin, ..sample });
-            values.push(recording.samples()[number]);
-        }
-    }
+    let Around { samples, values, .. } = Around::new(recordings, origin..end, reach, within);
     if samples.is_empty() {
         let error = MeanSquare { signal: 1.0, noise: 0.0 };
-        return Ok(Block { outputs: vec![0.0; instants.len()], error });
+        return Ok(Outputs { outputs: vec![0.0; instants.len()], error });
     }
     let instants: Vec<FastPeriods> = instants.iter().map(|instant| *instant - origin).collect();
     let set = estimator.set(&samples);
@@ -57,5 +50,5 @@ pub(super) fn block(
     let looked_at: Vec<FastPeriods> = instants.iter().step_by(every).copied().collect();
     let with_target = set.with_target(&looked_at);
     let errors = set.best_errors(&factor.solve(&with_target), &with_target);
-    Ok(Block { outputs, error: mean(&errors) })
+    Ok(Outputs { outputs, error: MeanSquare::mean(&errors) })
 }

@@ -23,6 +23,12 @@ pub struct MeanSquare {
 }
 
 impl MeanSquare {
+    /// The mean of some; there is at least one.
+    pub(super) fn mean(errors: &[Self]) -> Self {
+        let mean = |part: fn(&Self) -> f64| errors.iter().map(part).sum::<f64>() / errors.len() as f64;
+        Self { signal: mean(|error| error.signal), noise: mean(|error| error.noise) }
+    }
+
     /// Of both.
     pub fn total(self) -> f64 {
         self.signal + self.noise
@@ -41,15 +47,19 @@ pub struct Taps {
 /// Estimates the target from any set of samples.
 ///
 /// ```
-/// use hybank_instants::{Converter, Estimator, Sample, Signals, Spectrum}; use hybank_linalg::Complex; use
-/// hybank_core::units::{CyclesPerFastPeriod, FastPeriods}; // Two converters of half the rate, band up to
-/// 0.375 cycles per fast period, no front ends. let band =
-/// CyclesPerFastPeriod(0.0)..CyclesPerFastPeriod(0.375); let spectrum = Spectrum::flat(band,
-/// FastPeriods(64.0)); let converters = vec![Converter::exact(0, 1.0, 1e-8), Converter::exact(0, -0.5,
-/// 1e-8)]; let signals = Signals::new(&spectrum, &[&|_| Complex::from(1.0)], 0, converters); let sample =
-/// |converter, n: i32, delay| Sample { converter, instant: FastPeriods(2.0 * f64::from(n) + delay) }; let
-/// samples: Vec<Sample> = (-15..15).flat_map(|n| [sample(0, n, 0.0), sample(1, n, 0.8)]).collect(); let taps
-/// = Estimator::new(signals).taps(&samples, &[FastPeriods(1.0)])?; assert!(taps.errors[0].total() < 1e-7);
+/// use hybank_core::units::{CyclesPerFastPeriod, FastPeriods};
+/// use hybank_instants::{Converter, Estimator, Sample, Signals, Spectrum};
+/// use hybank_linalg::Complex;
+/// // Two converters of half the rate, band up to 0.375 cycles per fast period, no front ends.
+/// let band = CyclesPerFastPeriod(0.0)..CyclesPerFastPeriod(0.375);
+/// let spectrum = Spectrum::flat(band, FastPeriods(64.0));
+/// let converters = vec![Converter::exact(0, 1.0, 1e-8), Converter::exact(0, -0.5, 1e-8)];
+/// let signals = Signals::new(&spectrum, &[&|_| Complex::from(1.0)], 0, converters);
+/// let at = |converter, instant| Sample { converter, instant: FastPeriods(instant) };
+/// let pair = |n: i32| [at(0, 2.0 * f64::from(n)), at(1, 2.0 * f64::from(n) + 0.8)];
+/// let samples: Vec<Sample> = (-15..15).flat_map(pair).collect();
+/// let taps = Estimator::new(signals).taps(&samples, &[FastPeriods(1.0)])?;
+/// assert!(taps.errors[0].total() < 1e-7);
 /// # Ok::<(), hybank_linalg::LinalgError>(())
 /// ```
 #[derive(Debug, Clone)]
@@ -125,7 +135,9 @@ impl SampleSet<'_> {
     /// # Errors
     /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
     pub fn taps(&self, with_target: &Mat) -> Result<Taps, LinalgError> {
-        let weights = self.factor()?.solve(with_target);
+        // Nothing is known without samples, and 0 is the best estimate.
+        let weights =
+            if self.samples.is_empty() { with_target.clone() } else { self.factor()?.solve(with_target) };
         let errors = self.best_errors(&weights, with_target);
         Ok(Taps { weights, errors })
     }

@@ -1,8 +1,8 @@
-//! The signal behind whole recordings, at instants of a regular grid.
+//! Fusion of whole recordings: the target at the instants of a regular grid.
 
-use super::demand::{self, LONGEST_BLOCK};
+use super::demand::{self, LONGEST_BLOCK, Outputs};
 use super::estimator::{Estimator, MeanSquare};
-use super::knots::{Stretch, mean};
+use super::knots::Stretch;
 use super::recording::Recording;
 use hybank_core::units::FastPeriods;
 use hybank_linalg::LinalgError;
@@ -12,14 +12,13 @@ use std::ops::Range;
 /// Frames of a block, for which one error is stated.
 const FRAMES_PER_BLOCK: usize = 64;
 /// Outputs that share a set of samples where instants have no pattern.
-const OUTPUTS_ON_DEMAND: usize = 64;
+const OUTPUTS_OF_SET: usize = 64;
 /// Most blocks of a stretch, whose frames share the numbers of their samples.
 const MOST_BLOCKS: usize = 64;
 /// Periods by which the samples of a stretch may drift.
 const MOST_DRIFT: f64 = 1.0 / 16.0;
 /// Relative difference up to which clocks have nearly one rate.
 const SAME_RATE: f64 = 0.005;
-
 /// Times that samples around an output may lie farther apart than in the mean: stamps come unevenly.
 const SLACK: f64 = 1.5;
 
@@ -42,7 +41,7 @@ impl FusionSettings {
     }
 }
 
-/// The signal behind recordings.
+/// The estimate of the target.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fused {
     /// The outputs.
@@ -79,7 +78,10 @@ impl Grid {
 }
 
 /// Outputs of a stretch, and the errors of its blocks.
-type Part = (Vec<f64>, Vec<MeanSquare>);
+struct Part {
+    outputs: Vec<f64>,
+    errors: Vec<MeanSquare>,
+}
 
 /// Estimates the target at every output of a grid.
 ///
@@ -100,24 +102,74 @@ pub fn fuse(
     let longest = estimator.signals().longest();
     let common = common_ratio(recordings).filter(|ratio| ((2 * reach + 2) * ratio) as f64 <= longest.0);
     let grid = Grid { first, ratio: common.unwrap_or(1) };
+    let fusion = Fusion { estimator, recordings, grid, reach };
     let frames = count.div_ceil(grid.ratio);
     let length = FRAMES_PER_BLOCK * common.map_or(1, |ratio| blocks_of_stretch(recordings, ratio));
     let stretch = |number: usize| {
         let frames = number * length..frames.min((number + 1) * length);
-        match common {
-            Some(_) => on_knots(estimator, recordings, grid, reach, frames),
-            None => on_demand(estimator, recordings, grid, reach, frames),
-        }
+        let is_even =
+            common.is_some() && recordings.iter().all(|recording| fusion.is_even(recording, &frames));
+        if is_even { fusion.on_knots(frames) } else { fusion.on_demand(frames) }
     };
     let parts: Vec<Part> =
         (0..frames.div_ceil(length)).into_par_iter().map(stretch).collect::<Result<_, _>>()?;
     let (mut samples, mut errors) = (Vec::with_capacity(frames * grid.ratio), Vec::new());
-    for (outputs, of_blocks) in parts {
-        samples.extend(outputs);
-        errors.extend(of_blocks);
+    for part in parts {
+        samples.extend(part.outputs);
+        errors.extend(part.errors);
     }
     samples.truncate(count);
     Ok(Fused { samples, errors, block: FRAMES_PER_BLOCK * grid.ratio })
+}
+
+/// What all stretches of a run share.
+struct Fusion<'a> {
+    estimator: &'a Estimator,
+    recordings: &'a [Recording],
+    grid: Grid,
+    reach: usize,
+}
+
+impl Fusion<'_> {
+    /// Whether the samples around these frames come at nearly the common rate.
+    fn is_even(&self, recording: &Recording, frames: &Range<usize>) -> bool {
+        let clock = recording.clock();
+        let [first, last] = [frames.start, frames.end].map(|frame| clock.sample_at(self.grid.frame(frame)));
+        let reach = (self.reach + 1) as f64;
+        clock.periods(first - reach..last + reach).all(|period| is_near(period, self.grid.ratio))
+    }
+
+    fn on_knots(&self, frames: Range<usize>) -> Result<Part, LinalgError> {
+        let Self { estimator, recordings, grid, reach } = *self;
+        let stretch = Stretch::new(estimator, recordings, grid, reach, frames.clone())?;
+        let (mut outputs, mut errors) = (Vec::with_capacity(frames.len() * grid.ratio), Vec::new());
+        for (frame, found) in stretch.frames() {
+            let found = match found {
+                Some(found) => found,
+                None => self.of_set(&grid.instants(frame..frame + 1))?,
+            };
+            outputs.extend(found.outputs);
+            errors.push(found.error);
+        }
+        let errors = errors.chunks(FRAMES_PER_BLOCK).map(MeanSquare::mean).collect();
+        Ok(Part { outputs, errors })
+    }
+
+    fn on_demand(&self, frames: Range<usize>) -> Result<Part, LinalgError> {
+        let Self { grid, .. } = *self;
+        let (mut outputs, mut errors) = (Vec::with_capacity(frames.len() * grid.ratio), Vec::new());
+        for block in grid.instants(frames).chunks(FRAMES_PER_BLOCK * grid.ratio) {
+            let parts = block.chunks(OUTPUTS_OF_SET).map(|part| self.of_set(part));
+            let parts = parts.collect::<Result<Vec<_>, _>>()?;
+            errors.push(MeanSquare::mean(&parts.iter().map(|part| part.error).collect::<Vec<_>>()));
+            outputs.extend(parts.into_iter().flat_map(|part| part.outputs));
+        }
+        Ok(Part { outputs, errors })
+    }
+
+    fn of_set(&self, instants: &[FastPeriods]) -> Result<Outputs, LinalgError> {
+        demand::outputs(self.estimator, self.recordings, self.reach, instants)
+    }
 }
 
 /// The fast periods in the usual period of all recordings, if that is one integer.
@@ -132,65 +184,10 @@ fn is_near(period: f64, ratio: usize) -> bool {
     (period / ratio as f64 - 1.0).abs() < SAME_RATE
 }
 
-/// Blocks over which no clock drifts too far, but for steps.
+/// Blocks over which no clock drifts too far; its steps do not count.
 fn blocks_of_stretch(recordings: &[Recording], ratio: usize) -> usize {
     let periods = recordings.iter().flat_map(Recording::periods).filter(|period| is_near(*period, ratio));
     let fastest = periods.map(|period| (period / ratio as f64 - 1.0).abs()).fold(0.0, f64::max);
     let blocks = (MOST_DRIFT / (fastest * FRAMES_PER_BLOCK as f64)) as usize;
     1 << blocks.clamp(1, MOST_BLOCKS).ilog2()
-}
-
-/// Whether the samples around these frames come at nearly their common rate.
-fn is_even(recording: &Recording, grid: Grid, reach: usize, frames: &Range<usize>) -> bool {
-    let [first, last] =
-        [frames.start, frames.end].map(|frame| recording.clock().sample_at(grid.frame(frame)));
-    let reach = (reach + 1) as f64;
-    recording.clock().periods(first - reach..last + reach).all(|period| is_near(period, grid.ratio))
-}
-
-fn on_knots(
-    estimator: &Estimator,
-    recordings: &[Recording],
-    grid: Grid,
-    reach: usize,
-    frames: Range<usize>,
-) -> Result<Part, LinalgError> {
-    if !recordings.iter().all(|recording| is_even(recording, grid, reach, &frames)) {
-        return on_demand(estimator, recordings, grid, reach, frames);
-    }
-    let stretch = Stretch::new(estimator, recordings, grid, reach, frames.clone())?;
-    let (mut outputs, mut errors) = (Vec::with_capacity(frames.len() * grid.ratio), Vec::new());
-    for (frame, found) in stretch.frames() {
-        let error = match found {
-            Some(found) => {
-                outputs.extend(found.outputs);
-                found.error
-            }
-            None => {
-                let found = demand::block(estimator, recordings, reach, &grid.instants(frame..frame + 1))?;
-                outputs.extend(found.outputs);
-                found.error
-            }
-        };
-        errors.push(error);
-    }
-    Ok((outputs, errors.chunks(FRAMES_PER_BLOCK).map(mean).collect()))
-}
-
-fn on_demand(
-    estimator: &Estimator,
-    recordings: &[Recording],
-    grid: Grid,
-    reach: usize,
-    frames: Range<usize>,
-) -> Result<Part, LinalgError> {
-    let (mut outputs, mut errors) = (Vec::with_capacity(frames.len() * grid.ratio), Vec::new());
-    for block in grid.instants(frames).chunks(FRAMES_PER_BLOCK * grid.ratio) {
-        let parts =
-            block.chunks(OUTPUTS_ON_DEMAND).map(|part| demand::block(estimator, recordings, reach, part));
-        let parts = parts.collect::<Result<Vec<_>, _>>()?;
-        errors.push(mean(&parts.iter().map(|part| part.error).collect::<Vec<_>>()));
-        outputs.extend(parts.into_iter().flat_map(|part| part.outputs));
-    }
-    Ok((outputs, errors))
 }

@@ -1,5 +1,6 @@
 //! How well samples are predicted from those around them: a trial of a model by the recordings themselves.
 
+use super::around::Around;
 use super::estimator::{Estimator, Sample};
 use super::recording::Recording;
 use hybank_core::units::FastPeriods;
@@ -50,16 +51,10 @@ fn around(
     origin: FastPeriods,
 ) -> Result<Vec<HeldOut>, LinalgError> {
     let within = estimator.signals().longest() * 0.5;
-    let (mut samples, mut values, mut nearest) = (Vec::new(), Vec::new(), Vec::new());
-    for recording in recordings {
-        let numbers = recording.around(origin..origin, reach, within);
-        let place = numbers.iter().position(|number| *number as i64 == recording.nearest(origin));
-        nearest.extend(place.map(|place| samples.len() + place));
-        samples.extend(numbers.iter().map(|&number| {
-            let sample = recording.sample(number as i64);
-            Sample { instant: sample.instant - origin, ..sample }
-        }));
-        values.extend(numbers.iter().map(|&number| recording.samples()[number]));
+    let around = Around::new(recordings, origin..origin, reach, within);
+    let (nearest, Around { samples, values, .. }) = (around.nearest(), around);
+    if nearest.is_empty() {
+        return Ok(Vec::new());
     }
     // Sounds come and go, noise stays.
     let gain = |sample: &Sample| estimator.signals().converters()[sample.converter].gain;

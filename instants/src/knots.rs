@@ -6,6 +6,7 @@
 //! than the best taps there, or two recorders sample at one instant within it. There taps change sign within
 //! a ten thousandth of a period, which no look at the middle would find.
 
+use super::demand::Outputs;
 use super::estimator::{Estimator, MeanSquare, Sample, Taps};
 use super::fusion::Grid;
 use super::recording::Recording;
@@ -37,13 +38,6 @@ pub(super) struct Stretch<'a> {
 struct Knot {
     frame: usize,
     taps: Taps,
-}
-
-/// The outputs of a frame.
-pub(super) struct Frame {
-    pub(super) outputs: Vec<f64>,
-    /// The mean over the outputs.
-    pub(super) error: MeanSquare,
 }
 
 impl<'a> Stretch<'a> {
@@ -133,14 +127,14 @@ impl<'a> Stretch<'a> {
     }
 
     /// The outputs of all frames, in their order; `None` where a sample is not there.
-    pub(super) fn frames(&self) -> impl Iterator<Item = (usize, Option<Frame>)> {
+    pub(super) fn frames(&self) -> impl Iterator<Item = (usize, Option<Outputs>)> {
         self.knots.windows(2).flat_map(move |pair| {
             let [left, right] = [&pair[0], &pair[1]];
             (left.frame..right.frame).map(move |frame| (frame, self.frame(left, right, frame)))
         })
     }
 
-    fn frame(&self, left: &Knot, right: &Knot, frame: usize) -> Option<Frame> {
+    fn frame(&self, left: &Knot, right: &Knot, frame: usize) -> Option<Outputs> {
         let numbers: Vec<Range<i64>> = (0..self.recordings.len()).map(|i| self.numbers(i, frame)).collect();
         if self.recordings.iter().zip(&numbers).any(|(recording, samples)| !recording.is_whole(samples)) {
             return None;
@@ -152,10 +146,10 @@ impl<'a> Stretch<'a> {
         let part = (frame - left.frame) as f64 / (right.frame - left.frame) as f64;
         let between = |x: f64, y: f64| x + part * (y - x);
         let output = |p: usize| between(left.output(p, &slices), right.output(p, &slices));
-        let [first, second] = [left, right].map(|knot| mean(&knot.taps.errors));
+        let [first, second] = [left, right].map(|knot| MeanSquare::mean(&knot.taps.errors));
         let signal = between(first.signal, second.signal);
         let error = MeanSquare { signal, noise: between(first.noise, second.noise) };
-        Some(Frame { outputs: (0..self.grid.ratio).map(output).collect(), error })
+        Some(Outputs { outputs: (0..self.grid.ratio).map(output).collect(), error })
     }
 }
 
@@ -171,9 +165,4 @@ impl Knot {
 
 fn halfway(left: &Knot, right: &Knot) -> Mat {
     (&left.taps.weights + &right.taps.weights) * 0.5
-}
-
-pub(super) fn mean(errors: &[MeanSquare]) -> MeanSquare {
-    let mean = |part: fn(&MeanSquare) -> f64| errors.iter().map(part).sum::<f64>() / errors.len() as f64;
-    MeanSquare { signal: mean(|error| error.signal), noise: mean(|error| error.noise) }
 }

@@ -16,11 +16,12 @@
 //! Hassibi, Linear Estimation, chapter 3).
 //!
 //! [`Spectrum`] is S and [`Signals`] what the converters make of it. An [`Estimator`] gives taps and errors
-//! for a set of samples, [`fuse`] the signal behind whole [`Recording`]s. Times are in fast periods, which
+//! for a set of samples, [`fuse`] the target from whole [`Recording`]s. Times are in fast periods, which
 //! are those of the output.
 
 #![forbid(unsafe_code)]
 
+mod around;
 mod clock;
 mod covariance;
 mod demand;
@@ -30,18 +31,21 @@ mod heldout;
 mod knots;
 mod learned;
 mod model;
+mod noise;
 mod recording;
 mod signals;
 mod spectrum;
-#[cfg(test)]
-mod tests;
-
+mod ways;
 pub use clock::{Clock, ClockError};
 pub use estimator::{Estimator, MeanSquare, Sample, SampleSet, Taps};
 pub use fusion::{Fused, FusionSettings, fuse};
 pub use heldout::{HeldOut, held_out};
 pub use learned::learned;
-pub use model::{Model, Prior, Ways};
+pub use model::{Model, Prior};
 pub use recording::Recording;
 pub use signals::{Converter, Signals};
 pub use spectrum::{Node, Spectrum};
+pub use ways::Ways;
+
+#[cfg(test)]
+mod tests;

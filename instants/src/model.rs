@@ -1,21 +1,21 @@
 //! The model of recordings that states nothing: spectrum and noise, from the recordings themselves.
 
-use super::estimator::{Estimator, MeanSquare, Sample};
+use super::estimator::{Estimator, MeanSquare};
 use super::fusion::{FusionSettings, fuse};
 use super::heldout::{HeldOut, held_out};
-use super::knots::mean;
 use super::learned::learned;
+use super::noise::NoiseSearch;
 use super::recording::Recording;
 use super::signals::{Converter, Signals};
 use super::spectrum::Spectrum;
 use hybank_core::units::{CyclesPerFastPeriod, FastPeriods};
-use hybank_linalg::{Complex, LinalgError, Mat};
+use hybank_linalg::{Complex, LinalgError};
 
 /// Parts of the run from which the spectrum is learned, and outputs of each.
 const PARTS: usize = 128;
 const OUTPUTS_OF_PART: usize = 2048;
 /// Instants at which samples are left out, to measure the noise.
-const TRIALS: usize = 64;
+pub(super) const TRIALS: usize = 64;
 /// Noises that are tried with each band, over the power of the signal: as of recorders with 30, 50 and 70
 /// dB.
 const FIRST_NOISES: [f64; 3] = [1e-3, 1e-5, 1e-7];
@@ -24,13 +24,9 @@ const BANDS: std::ops::RangeInclusive<u32> = 3..=16;
 /// The density beyond the band over that within, before the spectrum is learned: so little that noise is not
 /// taken for signal.
 const BEYOND: f64 = 1e-10;
-/// How far the noise may lie below the signal: recorders have no more.
-const DECADES: i32 = 12;
 /// Twice the gain of log-likelihood that says that a recording has a noise of its own: once in a hundred by
 /// chance.
 const SIGNIFICANT: f64 = 6.6;
-/// By what the variance of the noise changes from trial to trial after that: 3 and 1 dB.
-const FACTORS: [f64; 2] = [1.995_262_314_968_879_6, 1.258_925_411_794_167_2];
 
 /// A signal with its recorders, whose front ends are equal and flat.
 #[derive(Debug, Clone)]
@@ -157,7 +153,7 @@ impl Model {
             fuse(&self.estimator, recordings, FusionSettings { first, count, ..settings })
         };
         let all = (0..parts).map(part).collect::<Result<Vec<_>, _>>()?;
-        let mut errors: Vec<f64> = all.iter().map(|fused| mean(&fused.errors).total()).collect();
+        let mut errors: Vec<f64> = all.iter().map(|fused| MeanSquare::mean(&fused.errors).total()).collect();
         let good = errors.clone();
         errors.sort_by(f64::total_cmp);
         let median = errors[parts / 2];
@@ -199,66 +195,16 @@ impl Model {
             Ok(misfit(&held_out(&estimator, recordings, settings.reach, self.power, &instants)?, self.power))
         };
         let all: Vec<usize> = (0..recordings.len()).collect();
-        let mut search = NoiseSearch { levels: vec![1.0; all.len()], misfit: f64::INFINITY };
+        let mut search = NoiseSearch::new(all.len());
         search.decades(&misfit)?;
         search.walk(&all, &misfit, 0.0)?;
         for i in all {
             search.walk(&[i], &misfit, SIGNIFICANT)?;
         }
-        self.noise = bounded(&search.levels);
+        self.noise = bounded(search.levels());
         let noise: Vec<f64> = self.noise.iter().map(|noise| noise / self.power).collect();
         self.estimator = Estimator::new(self.estimator.signals().with_noise(&noise));
         Ok(())
-    }
-}
-
-/// Noises, over the power of the signal in each recording, and how badly they predict.
-struct NoiseSearch {
-    levels: Vec<f64>,
-    misfit: f64,
-}
-
-type Misfit<'a> = &'a dyn Fn(&[f64]) -> Result<f64, LinalgError>;
-
-impl NoiseSearch {
-    /// The best decade for all: far below the right value the likelihood is flat, and a walk would stay
-    /// there.
-    fn decades(&mut self, misfit: Misfit<'_>) -> Result<(), LinalgError> {
-        let count = self.levels.len();
-        for decade in 0..=DECADES {
-            self.take_if_better(vec![10.0_f64.powi(-decade); count], misfit, 0.0)?;
-        }
-        Ok(())
-    }
-
-    /// Walks with the levels of `some` together; the first step must be better by `gain`.
-    fn walk(&mut self, some: &[usize], misfit: Misfit<'_>, gain: f64) -> Result<(), LinalgError> {
-        for step in FACTORS.into_iter().flat_map(|factor| [factor, 1.0 / factor]) {
-            let mut gain = gain;
-            loop {
-                let mut levels = self.levels.clone();
-                some.iter().for_each(|&i| levels[i] *= step);
-                if !self.take_if_better(levels, misfit, gain)? {
-                    break;
-                }
-                gain = 0.0;
-            }
-        }
-        Ok(())
-    }
-
-    fn take_if_better(
-        &mut self,
-        levels: Vec<f64>,
-        misfit: Misfit<'_>,
-        gain: f64,
-    ) -> Result<bool, LinalgError> {
-        let found = misfit(&levels)?;
-        let is_better = found + gain < self.misfit;
-        if is_better {
-            (self.levels, self.misfit) = (levels, found);
-        }
-        Ok(is_better)
     }
 }
 
@@ -272,7 +218,7 @@ fn misfit(found: &[HeldOut], power: f64) -> f64 {
 }
 
 /// Instants over the whole run that meet no pattern: multiples of the golden ratio.
-fn instants(settings: FusionSettings, count: usize) -> Vec<FastPeriods> {
+pub(super) fn instants(settings: FusionSettings, count: usize) -> Vec<FastPeriods> {
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     let at = |k: usize| settings.first + FastPeriods(settings.count as f64 * (k as f64 * golden).fract());
     (0..count).map(at).collect()
@@ -287,57 +233,4 @@ fn mean_power(recordings: &[Recording], gains: &[f64]) -> f64 {
     };
     let powers = recordings.iter().zip(gains).map(power);
     powers.sum::<f64>() / recordings.len() as f64
-}
-
-/// What the ways to use recordings give, in the mean over a run.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Ways {
-    /// All samples.
-    pub together: MeanSquare,
-    /// Those of one recording, by its number.
-    pub alone: Vec<MeanSquare>,
-    /// The mean of what each recording gives alone.
-    pub mean: MeanSquare,
-}
-
-impl Model {
-    /// What all samples give, those of each recording alone, and the mean of these.
-    ///
-    /// # Errors
-    /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
-    pub fn ways(&self, recordings: &[Recording], settings: FusionSettings) -> Result<Ways, LinalgError> {
-        let at = |instant: &FastPeriods| self.ways_at(recordings, settings.reach, *instant);
-        let all = instants(settings, TRIALS).iter().map(at).collect::<Result<Vec<_>, _>>()?;
-        let of = |way: usize| mean(&all.iter().map(|errors| errors[way]).collect::<Vec<_>>());
-        let count = recordings.len();
-        Ok(Ways { together: of(0), alone: (1..=count).map(of).collect(), mean: of(count + 1) })
-    }
-
-    /// The errors of all together, of each recording alone, and of their mean.
-    fn ways_at(
-        &self,
-        recordings: &[Recording],
-        reach: usize,
-        instant: FastPeriods,
-    ) -> Result<Vec<MeanSquare>, LinalgError> {
-        let within = self.estimator.signals().longest() * 0.5;
-        let of = |recording: &Recording| -> Vec<Sample> {
-            let numbers = recording.around(instant..instant, reach, within).into_iter();
-            numbers.map(|number| recording.sample(number as i64)).collect()
-        };
-        let sets: Vec<Vec<Sample>> = recordings.iter().map(of).collect();
-        let (all, count) = (sets.concat(), sets.len());
-        let set = self.estimator.set(&all);
-        let with_target = set.with_target(&[instant]);
-        let mut weights = Mat::zeros(all.len(), count + 2);
-        weights.column_mut(0).copy_from(&set.taps(&with_target)?.weights.column(0));
-        let mut row = 0;
-        for (i, own) in sets.iter().enumerate() {
-            let taps = self.estimator.taps(own, &[instant])?.weights;
-            weights.view_mut((row, i + 1), (own.len(), 1)).copy_from(&taps);
-            weights.view_mut((row, count + 1), (own.len(), 1)).copy_from(&(taps / count as f64));
-            row += own.len();
-        }
-        Ok(set.errors(&weights, &Mat::from_fn(all.len(), count + 2, |k, _| with_target[k])))
-    }
 }

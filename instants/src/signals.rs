@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 /// digits that tell samples apart.
 const LEAST_NOISE: f64 = 1e-12;
 
-/// A converter behind one of the front ends.
+/// A converter with its front end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Converter {
     /// Number of its front end.

@@ -16,7 +16,8 @@ const SHORTEST_PIECE: usize = 256;
 /// Number of pieces, where the length allows for it.
 const LEAST_PIECES: usize = 16;
 const MOST_PIECES: usize = 8192;
-/// Most lines, and most pieces that are looked for in vain: where one recording is silent or had ended.
+/// Most lines, and most pieces that are looked for without success: where one recording is near zero or has
+/// ended.
 const MOST_LINES: usize = 32;
 const MOST_IN_VAIN: usize = 16;
 /// Pieces of a stretch that is looked for.

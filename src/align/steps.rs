@@ -11,7 +11,7 @@ use crate::units::FastPeriods;
 
 /// Pieces on each side of a step whose median is the lag there.
 const BESIDE: usize = 4;
-/// By how much a rate may wander while a recording is silent: 5 ppm.
+/// By how much a rate may wander while a recording is near zero: 5 ppm.
 const RATE_WANDERS: f64 = 5e-6;
 /// Samples on each side of the two pieces beside a step that say how well the lags fit.
 const SURE: f64 = 1024.0;

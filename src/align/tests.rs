@@ -219,7 +219,7 @@ fn steps_are_found_reported_and_followed() {
         for &(place, lost) in &steps {
             other.extend_from_slice(&whole[begin..place]);
             numbers.extend(begin..place);
-            // What comes in has been heard before.
+            // What comes in was recorded before.
             let surplus = i64::max(0, -lost) as usize;
             other.extend_from_slice(&whole[place - 5000..place - 5000 + surplus]);
             numbers.resize(other.len(), usize::MAX);

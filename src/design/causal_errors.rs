@@ -34,7 +34,7 @@ pub(super) struct CausalErrors {
 }
 
 impl CausalErrors {
-    /// At all latencies that may be worth a design. The error does not grow with the latency.
+    /// At all latencies that are candidates for a design. The error does not grow with the latency.
     ///
     /// # Errors
     /// [`DesignError::RiccatiFailed`] if the Riccati equation could not be solved.

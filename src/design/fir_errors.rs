@@ -146,8 +146,8 @@ fn is_covered(problem: &Problem, taps: usize) -> bool {
     instants.any(|instant| problem.delays().iter().any(|delay| sees(-delay.0, instant)))
 }
 
-/// All latencies that may be worth a design: from the wait for a whole frame up to the oldest sample that a
-/// tap sees.
+/// All latencies that are candidates for a design: from the wait for a whole frame up to the oldest sample
+/// that a tap sees.
 pub(super) fn candidates(problem: &Problem, taps: usize) -> RangeInclusive<usize> {
     problem.wait..=(taps + problem.longest_delay().0.ceil() as usize).min(MAX_LATENCY)
 }

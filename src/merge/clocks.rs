@@ -15,7 +15,7 @@ use crate::units::{CyclesPerFastPeriod, FastPeriods, Hertz, Seconds};
 /// Samples between two knots of a clock: its rate is constant over them.
 const KNOT_EVERY: usize = 256;
 /// Relative difference of rates that count as one.
-const SAME_RATE: f64 = 0.005;
+const SAME_RATE: f64 = 0.001;
 /// Samples on either side from which a recording is brought to another rate.
 const REACH: usize = 16;
 /// The part of the lower one of two rates that is kept of a signal.
@@ -40,6 +40,9 @@ pub(super) struct Placed {
 /// # Errors
 /// [`MergeError`].
 pub(super) fn placed(sources: &[Source], rate: Hertz, within: Option<Seconds>) -> Result<Placed, MergeError> {
+    if let Some(flat) = sources.iter().find(|source| is_flat(&source.record)) {
+        return Err(MergeError::NoSignal { name: flat.name.clone() });
+    }
     let has_stamps = |source: &&Source| source.stamps.is_some();
     match (sources.iter().find(has_stamps), sources.iter().find(|source| !has_stamps(source))) {
         (Some(stamped), Some(plain)) => {
@@ -49,6 +52,13 @@ pub(super) fn placed(sources: &[Source], rate: Hertz, within: Option<Seconds>) -
         _ if sources.len() == 1 => Ok(alone(&sources[0], rate)),
         _ => by_alignment(sources, rate, within),
     }
+}
+
+/// Whether all usable samples are equal.
+fn is_flat(record: &Record) -> bool {
+    let mut usable = record.samples.iter().zip(&record.keep).filter(|(_, keep)| **keep).map(|(x, _)| *x);
+    let first = usable.next();
+    usable.all(|x| Some(x) == first)
 }
 
 /// The samples, NaN where they are not usable, with the mean of those that are.
@@ -133,7 +143,7 @@ fn by_alignment(sources: &[Source], rate: Hertz, within: Option<Seconds>) -> Res
     }
     let gains: Vec<Estimate<f64>> = alignment.channels.iter().map(|channel| channel.gain).collect();
     let deviation =
-        |i: usize| FastPeriods(ratio * rms_deviation(alignment.instants(i), records[i].samples.len()));
+        |i: usize| FastPeriods(ratio * usual_deviation(alignment.instants(i), records[i].samples.len()));
     let delay_deviations = (0..sources.len()).map(deviation).collect();
     // Taps follow the delays, and the predicted error says what coincidences cost.
     let is_of_fixed = |warning: &AlignWarning| {
@@ -154,10 +164,11 @@ fn by_alignment(sources: &[Source], rate: Hertz, within: Option<Seconds>) -> Res
     })
 }
 
-/// Of the instants of so many samples.
-fn rms_deviation(course: &ClockCourse, count: usize) -> f64 {
-    let all = (0..count).step_by(KNOT_EVERY).map(|k| course.deviation(k as f64).powi(2));
-    (all.sum::<f64>() / count.div_ceil(KNOT_EVERY).max(1) as f64).sqrt()
+/// The median over so many samples: at its ends a clock is known far worse than elsewhere.
+fn usual_deviation(course: &ClockCourse, count: usize) -> f64 {
+    let mut all: Vec<f64> = (0..count).step_by(KNOT_EVERY).map(|k| course.deviation(k as f64)).collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
 
 struct Place {

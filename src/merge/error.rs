@@ -40,6 +40,20 @@ pub enum MergeError {
         /// What is wrong with them.
         problem: ClockError,
     },
+    /// Nothing but one value.
+    #[error("{} has no signal: all its samples are equal or lost; leave it out", Quoted(.name))]
+    NoSignal {
+        /// The source.
+        name: String,
+    },
+    /// The result is too long.
+    #[error(
+        "there is no memory for the {samples} samples of the result; ask for a lower rate, or merge parts"
+    )]
+    Memory {
+        /// How many it has.
+        samples: usize,
+    },
     /// They lie at different times.
     #[error(
         "all recordings together have {seconds:.3} s in common, of up to {samples} samples; give recordings of one event \
@@ -74,4 +88,12 @@ pub enum MergeWarning {
     /// Found on the way.
     #[error(transparent)]
     Align(#[from] AlignWarning),
+    /// Samples that are not used.
+    #[error("{clipped} clipped samples of {} are left out", Quoted(.name))]
+    Clipped {
+        /// The source.
+        name: String,
+        /// How many.
+        clipped: usize,
+    },
 }

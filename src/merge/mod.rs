@@ -7,8 +7,6 @@
 
 mod clocks;
 mod error;
-#[cfg(test)]
-mod tests;
 
 pub use error::{MergeError, MergeWarning};
 
@@ -27,8 +25,8 @@ const REACH: usize = 24;
 const LEAST_OUTPUTS: usize = 1024;
 /// Most outputs for each sample of all recordings.
 const MOST_OUTPUTS: f64 = 64.0;
-/// What all recordings must gain over one alone or their mean to be worth it.
-const WORTH: Decibels = Decibels(0.5);
+/// What all recordings must gain over one alone; with less it suffices.
+const LEAST_GAIN: Decibels = Decibels(0.5);
 
 /// What one recorder or logger delivered.
 #[derive(Debug, Clone, PartialEq)]
@@ -111,7 +109,7 @@ pub struct Quality {
 impl Quality {
     /// The source, from 0, that alone is as good as all together.
     pub fn sufficient(&self) -> Option<usize> {
-        (0..self.alone.len()).find(|&i| self.alone[i].0 + WORTH.0 >= self.snr.0)
+        (0..self.alone.len()).find(|&i| self.alone[i].0 + LEAST_GAIN.0 >= self.snr.0)
     }
 }
 
@@ -121,9 +119,10 @@ impl Quality {
 /// [`MergeError`].
 pub fn merge(sources: &[Source], settings: MergeSettings) -> Result<Merged, MergeError> {
     let rate = output_rate(sources, settings)?;
-    let Placed { recordings, found, gains, gain_deviations, delay_deviations, level, warnings } =
+    let Placed { recordings, found, gains, gain_deviations, delay_deviations, level, mut warnings } =
         clocks::placed(sources, rate, settings.within)?;
     let (first, grid) = grid(sources, &recordings, rate)?;
+    check_memory(grid.count)?;
     let step_noise = |source: &Source| source.step * source.step / 12.0;
     let prior = Prior {
         band: settings.band.map(|band| CyclesPerFastPeriod((band.0 / rate.0).min(0.5))),
@@ -137,10 +136,16 @@ pub fn merge(sources: &[Source], settings: MergeSettings) -> Result<Merged, Merg
     let fused = fuse(&model.estimator, &recordings, grid)?;
     let quality = quality(&model, &fused, &recordings, grid, rate)?;
     let noise = |(found, noise): (Found, &f64)| Found { noise: noise.sqrt(), ..found };
+    warnings.extend(sources.iter().filter_map(clipped));
     let sources = found.into_iter().zip(&model.noise).map(noise).collect();
     let samples = fused.samples.iter().map(|x| x + level).collect();
     let begin = Seconds(grid.first.0 / rate.0);
     Ok(Merged { samples, rate, first, begin, sources, quality, warnings })
+}
+
+fn clipped(source: &Source) -> Option<MergeWarning> {
+    let clipped = source.record.clipped;
+    (clipped > 0).then(|| MergeWarning::Clipped { name: source.name.clone(), clipped })
 }
 
 fn output_rate(sources: &[Source], settings: MergeSettings) -> Result<Hertz, MergeError> {
@@ -176,6 +181,12 @@ fn grid(
     Ok((first as usize, FusionSettings { first: begin, count, reach: REACH }))
 }
 
+/// Refuses a result for which there is no memory, before the work.
+fn check_memory(samples: usize) -> Result<(), MergeError> {
+    let mut room: Vec<f64> = Vec::new();
+    room.try_reserve_exact(samples).map_err(|_| MergeError::Memory { samples })
+}
+
 /// Errors of the signal count by the power around, those of the noise as they are.
 fn quality(
     model: &Model,
@@ -206,3 +217,6 @@ fn quality(
         mean: ratio(ways.mean.total()),
     })
 }
+
+#[cfg(test)]
+mod tests;

@@ -158,8 +158,12 @@ impl<'a> Pipeline<'a> {
 
 /// Room for so many numbers.
 fn room(buffer: &mut Vec<u8>, format: PcmFormat, numbers: usize) -> PcmOutput<'_> {
-    buffer.resize(numbers * format.bytes(), 0);
-    PcmOutput::packed(format, buffer)
+    let bytes = numbers * format.bytes();
+    // It only grows: what is in it is overwritten.
+    if buffer.len() < bytes {
+        buffer.resize(bytes, 0);
+    }
+    PcmOutput::packed(format, &mut buffer[..bytes])
 }
 
 #[cfg(test)]
