@@ -16,8 +16,8 @@ pub(super) struct Around {
 }
 
 impl Around {
-    /// Those between two instants, and `reach` more of each recording on either side, as far as they are there
-    /// and not more than `within` away.
+    /// Those between two instants, and `reach` more of each recording on either side, as far as they are
+    /// there and not more than `within` away.
     pub(super) fn new(
         recordings: &[Recording],
         instants: Range<FastPeriods>,
