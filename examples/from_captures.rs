@@ -5,15 +5,16 @@
 
 use hybank::calibrate::{self, CalibrationSignal, Record, applied, calibrate};
 use hybank::design::uncertainty::BoxStudy;
-use hybank::design::{Problem, design};
+use hybank::design::{MissingSamples, Problem, design};
 use hybank::measure::{self, measure};
-use hybank::pipeline::{self, GapPolicy, fuse};
-use hybank::runtime::{Options, Planar};
+use hybank::pipeline::{self, fuse};
+use hybank::runtime::{Algorithm, Options, Planar};
 use hybank::simulate::{Analog, Source, capture};
 use hybank::spec::{ErrorBox, Spec};
 use hybank::units::{Hertz, Seconds};
 use hybank::verify::verify;
 use std::error::Error;
+use std::sync::Arc;
 
 /// As drawn: the delays, the front ends, and where the signal ends.
 const SPEC: &str = r#"
@@ -59,13 +60,14 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let mut tone = captured(&built, "tones:3.1kHz")?;
     tone[0][9000..9004].fill(f64::NAN);
-    let settings = pipeline::Settings { gaps: Some(GapPolicy::Hold), ..Default::default() };
-    let plan = bank.plan(settings.options(Options::default()))?;
+    let estimator = Arc::new(MissingSamples::of_bank(&bank)?);
+    let settings = pipeline::Settings { gaps: Some(estimator), ..Default::default() };
+    let plan = bank.plan(Options { algorithm: Algorithm::Direct, ..Options::default() })?;
     let channels: Vec<&[f64]> = tone.iter().map(Vec::as_slice).collect();
     let mut output = vec![0.0f64; FRAMES * bank.ratio];
     let outcome =
         fuse(&bank, &plan, &[&Planar::new(&channels)?], &mut output.as_mut_slice(), settings, &|| false)?;
-    let affected = outcome.mask.iter().flatten().filter(|&&mark| mark == 1).count();
+    let affected = outcome.mask.iter().flatten().filter(|&&mark| mark > 0).count();
     println!("{} samples, {affected} of them affected by the gap", outcome.samples);
 
     let whole = measure(&output[1000..17_000], Hertz(48e3), &measure::Settings::default())?;

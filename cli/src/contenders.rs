@@ -89,8 +89,9 @@ pub(super) fn contend(spec: &Spec, problem: &Problem, parts: &Parts) -> Result<V
         let bank = designed(spec, method, knows_the_band)?;
         // The target is as late as the bank.
         let causal = Settings { dropped: DroppedLatency::Added, ..Settings::default() };
-        let contender =
-            Contender::judge(name, file, parts, |channels| fused(&bank, channels, causal).map_err(stopped))?;
+        let contender = Contender::judge(name, file, parts, |channels| {
+            fused(&bank, channels, causal.clone()).map_err(stopped)
+        })?;
         contenders.push(Contender { gamma: bank.gamma.norm, ..contender });
     }
     let (delays, ratio, latency) = (problem.delays(), problem.ratio, problem.latency);

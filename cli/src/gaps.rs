@@ -1,25 +1,29 @@
-//! Missing samples on the command line: their replacement, the report, the mask file.
+//! Missing samples on the command line: their estimates, the report, the mask file.
 
 use super::print::say_line;
-use super::print::{Failure, failed};
+use super::print::{Failure, InFile, failed};
 use super::written::begin_beside;
+use hybank::bank::Bank;
+use hybank::design::MissingSamples;
 use hybank::files::AtomicFile;
 use hybank::io::{LostSamples, MAX_LOST, ReadOptions, Until};
-use hybank::pipeline::{GapPolicy, GapSummary};
+use hybank::messages::Quoted;
+use hybank::pipeline::{GapEstimator, GapSummary};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Maximum number of gaps that are listed on standard error.
 const REPORTED: usize = 10;
 
-/// Options of the commands that can fill gaps.
+/// Options of the commands that can estimate missing samples.
 #[derive(Debug, clap::Args)]
 pub(super) struct GapArgs {
-    /// Fill and report missing samples: hold repeats the last good sample, zero takes 0, and mask takes 0
-    /// and needs --mask. Missing samples are signalled by NaN, by jumps of SigMF `core:global_index`, or by
-    /// --lost
-    #[arg(long, value_enum, value_name = "POLICY")]
-    gaps: Option<Policy>,
-    /// Write one byte per output sample: 1 if a missing sample affects it, 0 if not
+    /// Estimate missing samples from all those around them, and report them. They are NaN, jumps of SigMF
+    /// `core:global_index`, or in the file of --lost. The bank needs its spec
+    #[arg(long)]
+    gaps: bool,
+    /// Write one byte per output sample: 0 where no missing sample affects it, else its predicted SNR in
+    /// whole decibels, from 1 to 255
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
     /// File of JSON lines that name lost samples. {"channel": 1, "sample_start": 5, "global_index": 8}:
@@ -32,33 +36,19 @@ pub(super) struct GapArgs {
     /// an error, because a number is probably wrong [default: 67108864]
     #[arg(long, value_name = "FRAMES")]
     max_lost: Option<u64>,
-    /// Continue until the last channel ends; the missing ends of the other channels are filled as gaps
+    /// Continue until the last channel ends; the missing ends of the other channels are gaps
     #[arg(long)]
     longest: bool,
-}
-
-/// The replacement of a missing sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Policy {
-    /// The last good sample of the channel
-    Hold,
-    /// Zero
-    Zero,
-    /// Zero, and the affected outputs are marked in the mask file
-    Mask,
 }
 
 impl GapArgs {
     /// Refuses impossible combinations of options, before any file is read.
     pub(super) fn check(&self) -> Result<(), Failure> {
-        if let (None, Some(option)) = (self.gaps, self.only_with_gaps()) {
+        if let (false, Some(option)) = (self.gaps, self.only_with_gaps()) {
             return Err(Failure::Usage(format!(
-                "{option} is about missing samples, which nothing replaces without --gaps; give --gaps hold, zero or \
-                 mask, or leave {option} out"
+                "{option} is about missing samples, which nothing estimates without --gaps; give it too, or leave \
+                 {option} out"
             )));
-        }
-        if self.gaps == Some(Policy::Mask) && self.mask.is_none() {
-            return Err(Failure::Usage("--gaps mask needs --mask FILE for the marks".into()));
         }
         if self.mask().is_some_and(|path| path.as_os_str() == "-") {
             let message = "--mask -: the mask cannot go to standard output; give it a file";
@@ -103,12 +93,29 @@ impl GapArgs {
         ReadOptions { lost, until, max_lost: self.max_lost.unwrap_or(MAX_LOST), ..options }
     }
 
-    /// The replacement of a missing sample, if gaps are to be filled.
-    pub(super) fn policy(&self) -> Option<GapPolicy> {
-        self.gaps.map(|policy| match policy {
-            Policy::Hold => GapPolicy::Hold,
-            Policy::Zero | Policy::Mask => GapPolicy::Zero,
-        })
+    /// Whether missing samples are estimated.
+    pub(super) fn are_wanted(&self) -> bool {
+        self.gaps
+    }
+
+    /// What estimates missing samples of the converters of a bank, if that is wanted.
+    pub(super) fn estimator(
+        &self,
+        bank: &Bank,
+        path: &Path,
+    ) -> Result<Option<Arc<dyn GapEstimator>>, Failure> {
+        if !self.gaps {
+            return Ok(None);
+        }
+        if bank.spec.is_none() {
+            return Err(Failure::Input(format!(
+                "{}: the bank has no spec, so nothing tells how its samples hang together and --gaps cannot estimate \
+                 missing ones; design the bank with hybank, or leave --gaps out, which takes 0 for them",
+                Quoted(path)
+            )));
+        }
+        let estimator = MissingSamples::of_bank(bank).in_file(path)?;
+        Ok(Some(Arc::new(estimator)))
     }
 
     /// Begins the mask file.

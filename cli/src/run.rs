@@ -149,16 +149,11 @@ impl Job<'_> {
         Ok(reader)
     }
 
-    fn settings(&self) -> Settings<'static> {
-        let Self { args, dropped, .. } = *self;
-        Settings { dropped, gaps: args.gaps.policy(), workers: None }
-    }
-
     fn options(&self) -> Options {
         let asked = self.args.algorithm;
-        let algorithm = if self.is_live { asked.without_added_latency() } else { asked };
-        let options = Options { precision: Precision::of(self.format), algorithm, ..Options::default() };
-        self.settings().options(options)
+        let adds_none = self.is_live || self.args.gaps.are_wanted();
+        let algorithm = if adds_none { asked.without_added_latency() } else { asked };
+        Options { precision: Precision::of(self.format), algorithm, ..Options::default() }
     }
 
     /// The plan of the run.
@@ -181,7 +176,8 @@ impl Job<'_> {
     ) -> Result<Finished, Failure> {
         let (rate, is_complex) = (self.output_rate(reader)?, reader.is_complex());
         let workers = self.args.workers()?;
-        let settings = Settings { workers: workers.as_ref(), ..self.settings() };
+        let gaps = self.args.gaps.estimator(self.bank, self.bank_path)?;
+        let settings = Settings { dropped: self.dropped, gaps, workers: workers.as_ref() };
         let pipeline = Pipeline::new(self.bank, plan, settings, self.format, is_complex);
         let mut outputs = self.outputs(rate, is_complex)?;
         let mut kept = Vec::new();
@@ -249,20 +245,21 @@ impl Job<'_> {
         })
     }
 
-    /// Brings out the last samples, if they are wanted, of a run of so many frames.
+    /// Brings out the last samples of a run of so many frames; those that frames without a signal bring out
+    /// only if they are wanted.
     fn drain(
         &self,
         mut pipeline: Pipeline<'_>,
         frames: u64,
         outputs: &mut FileOutputs,
     ) -> Result<Outcome, Failure> {
-        let samples = match self.is_live {
-            true => pipeline.samples() + (pipeline.plan().flush_frames() * self.bank.ratio) as u64,
-            false => frames * self.bank.ratio as u64,
+        let so_far = pipeline.samples() + pipeline.pending();
+        let samples = match (self.is_live, self.flush) {
+            (false, _) => frames * self.bank.ratio as u64,
+            (true, true) => so_far + (pipeline.plan().flush_frames() * self.bank.ratio) as u64,
+            (true, false) => so_far,
         };
-        if self.flush {
-            pipeline.flush(samples, &mut |block| outputs.write(block)).map_err(stopped)?;
-        }
+        pipeline.flush(samples, &mut |block| outputs.write(block)).map_err(stopped)?;
         Ok(pipeline.finish())
     }
 

@@ -172,7 +172,7 @@ class Bank:
         axis: int = -1,
         dtype: DTypeLike | None = None,
         threads: int = 1,
-        gaps: Literal["hold", "zero"] | None = None,
+        gaps: bool = False,
         algorithm: _Algorithm = "auto",
         keep_latency: bool = False,
         interleaved: int | None = None,
@@ -187,7 +187,7 @@ class Bank:
         axis: int = -1,
         dtype: DTypeLike | None = None,
         threads: int = 1,
-        gaps: Literal["hold", "zero"] | None = None,
+        gaps: bool = False,
         algorithm: _Algorithm = "auto",
         keep_latency: bool = False,
         interleaved: int | None = None,
@@ -204,7 +204,7 @@ class Bank:
         dtype: DTypeLike | None = None,
         algorithm: _Algorithm = "auto",
         state: bytes | None = None,
-        gaps: Literal["hold", "zero"] | None = None,
+        gaps: bool = False,
     ) -> Stream: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __copy__(self) -> Bank: ...
@@ -237,7 +237,7 @@ class Stream:
     @property
     def state_resets(self) -> int: ...
     @property
-    def gaps(self) -> list[tuple[int, int, int]] | None: ...
+    def gaps(self) -> list[tuple[int, int, int, float]] | None: ...
     @property
     def mask(self) -> NDArray[np.bool_] | None: ...
     @property

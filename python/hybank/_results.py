@@ -211,9 +211,11 @@ class FuseReport:
     warnings
         What was tolerated. Each is a ``UserWarning``, too.
     missing, gaps
-        Missing samples, and the gaps (channel from 1, first frame, length); None unless gaps were filled.
+        Missing samples, and the gaps (channel from 1, first sample, length, predicted SNR in dB); None unless they
+        were estimated.
     mask
-        True where a missing sample affects the output; None unless gaps were filled.
+        0 where no missing sample affects the output, else its predicted SNR in dB, from 1 to 255; None unless they
+        were estimated.
     """
 
     plan: Record
@@ -231,8 +233,8 @@ class FuseReport:
     seconds: float
     warnings: list[str]
     missing: int | None
-    gaps: list[tuple[int, int, int]] | None
-    mask: NDArray[np.bool_] | None
+    gaps: list[tuple[int, int, int, float]] | None
+    mask: NDArray[np.uint8] | None
 
     def __repr__(self):
         names = ("latency_dropped", "peak", "clipped", "replaced")

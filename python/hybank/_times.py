@@ -33,7 +33,7 @@ def check(bank, times, name):
         k = int(np.argmin(is_even))
         raise HybankError(
             f"{name}: {steps[k]:.6g} s lie between samples {k} and {k + 1}, and {usual:.6g} s between most; "
-            "put NaN where samples were lost, as reindex() does, and give gaps=, or leave the times out"
+            "put NaN where samples were lost, as reindex() does, and give gaps=True, or leave the times out"
         )
     frames, wanted = (len(times) - 1) / since[-1], 1 / (bank.ratio * bank.fast_period)
     # Both ends are rounded by half of what their digit is, or of what the steps scatter.

@@ -3,7 +3,7 @@
 use crate::arrays::{framed, matrix, read_only};
 use crate::background;
 use crate::errors::{choose, refused};
-use crate::fuse::{self, Request, parse_algorithm, parse_gaps};
+use crate::fuse::{self, Request, parse_algorithm};
 use crate::hardware::{self, CircuitKeywords};
 use crate::outputs::write_file;
 use crate::pictures;
@@ -258,10 +258,10 @@ impl Bank {
     #[doc = include_str!("docs/Bank.fuse.rst")]
     #[pyo3(
         signature = (
-            x, *, axis = -1, dtype = None, threads = 1, gaps = None, algorithm = "auto", keep_latency = false,
+            x, *, axis = -1, dtype = None, threads = 1, gaps = false, algorithm = "auto", keep_latency = false,
             interleaved = None, rate = None, full_output = false
         ),
-        text_signature = "($self, x, *, axis=-1, dtype=None, threads=1, gaps=None, algorithm='auto', keep_latency=False, interleaved=None, rate=None, full_output=False)"
+        text_signature = "($self, x, *, axis=-1, dtype=None, threads=1, gaps=False, algorithm='auto', keep_latency=False, interleaved=None, rate=None, full_output=False)"
     )]
     #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
     fn fuse<'py>(
@@ -270,7 +270,7 @@ impl Bank {
         axis: isize,
         dtype: Option<Bound<'py, PyAny>>,
         threads: i64,
-        gaps: Option<&str>,
+        gaps: bool,
         algorithm: &str,
         keep_latency: bool,
         interleaved: Option<usize>,
@@ -294,7 +294,7 @@ impl Bank {
         let (frames, shape) = framed(x, &bank.layout(), axis, false)?;
         let request = Request {
             workers: fuse::workers(threads)?,
-            gaps: parse_gaps(gaps)?,
+            gaps: fuse::gaps(py, bank, gaps)?,
             algorithm: parse_algorithm(algorithm)?,
             keep_latency,
             is_reported: full_output,
@@ -326,8 +326,8 @@ impl Bank {
 
     #[doc = include_str!("docs/Bank.stream.rst")]
     #[pyo3(
-        signature = (*, axis = -1, dtype = None, algorithm = "auto", state = None, gaps = None),
-        text_signature = "($self, *, axis=-1, dtype=None, algorithm='auto', state=None, gaps=None)"
+        signature = (*, axis = -1, dtype = None, algorithm = "auto", state = None, gaps = false),
+        text_signature = "($self, *, axis=-1, dtype=None, algorithm='auto', state=None, gaps=False)"
     )]
     fn stream(
         slf: &Bound<'_, Self>,
@@ -335,10 +335,10 @@ impl Bank {
         dtype: Option<Bound<'_, PyAny>>,
         algorithm: &str,
         state: Option<&[u8]>,
-        gaps: Option<&str>,
+        gaps: bool,
     ) -> PyResult<Stream> {
         let bank = &slf.get().bank;
-        Stream::new(bank, axis, dtype.as_ref(), algorithm, parse_gaps(gaps)?)?.resumed(state)
+        Stream::new(bank, axis, dtype.as_ref(), algorithm, fuse::gaps(slf.py(), bank, gaps)?)?.resumed(state)
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {

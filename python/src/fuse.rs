@@ -2,17 +2,19 @@
 
 use crate::arrays::{Held, Shape};
 use crate::background::{self, Signals};
-use crate::errors::{capture_error, choose, refused, warn};
+use crate::errors::{capture_error, refused, warn};
 use crate::formats::Format;
 use crate::outputs::NewArray;
 use crate::results::Made;
 use hybank::bank::Bank;
 use hybank::calibrate::{Agreement, Record, Verdict, agreement, comparable, frames_for_agreement};
+use hybank::design::MissingSamples;
 use hybank::io::OfflineSamples;
-use hybank::pipeline::{self, DroppedLatency, GapPolicy, GapSummary, Outcome, Settings, Warning};
+use hybank::pipeline::{self, DroppedLatency, Gap, GapEstimator, GapSummary, Outcome, Settings, Warning};
 use hybank::runtime::{Algorithm, Frames, Input, Options, PcmFormat, Plan, Precision, ThreadPool};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// Most threads: more than any processor has, and as many as start at once.
@@ -21,7 +23,7 @@ const MOST_THREADS: i64 = 1024;
 /// How an array is to be fused.
 pub(crate) struct Request {
     pub(crate) workers: Option<ThreadPool>,
-    pub(crate) gaps: Option<GapPolicy>,
+    pub(crate) gaps: Option<Arc<dyn GapEstimator>>,
     pub(crate) algorithm: Algorithm,
     pub(crate) keep_latency: bool,
     /// A report is wanted, and so is what the captures say of the spec of the bank.
@@ -31,14 +33,18 @@ pub(crate) struct Request {
 impl Request {
     fn settings(&self) -> Settings<'_> {
         let dropped = if self.keep_latency { DroppedLatency::Added } else { DroppedLatency::All };
-        Settings { dropped, gaps: self.gaps, workers: self.workers.as_ref() }
+        Settings { dropped, gaps: self.gaps.clone(), workers: self.workers.as_ref() }
     }
 }
 
-/// The policy of a name.
-pub(crate) fn parse_gaps(gaps: Option<&str>) -> PyResult<Option<GapPolicy>> {
-    let known = [("hold", GapPolicy::Hold), ("zero", GapPolicy::Zero)];
-    gaps.map(|name| choose("gaps", name, &known)).transpose()
+/// What estimates the missing samples of a bank's converters, if that is wanted.
+pub(crate) fn gaps(py: Python<'_>, bank: &Bank, are_wanted: bool) -> PyResult<Option<Arc<dyn GapEstimator>>> {
+    if !are_wanted {
+        return Ok(None);
+    }
+    let estimator =
+        py.detach(|| MissingSamples::of_bank(bank)).map_err(|error| refused(format!("gaps: {error}")))?;
+    Ok(Some(Arc::new(estimator)))
 }
 
 /// The threads beside the caller's; `None` for a single one.
@@ -57,15 +63,10 @@ pub(crate) fn parse_algorithm(name: &str) -> PyResult<Algorithm> {
     name.parse().map_err(|error| refused(format!("algorithm: {error}")))
 }
 
-/// The bank made ready for outputs of a format, in a run with `settings`.
-pub(crate) fn plan(
-    bank: &Bank,
-    format: Format,
-    algorithm: Algorithm,
-    settings: Settings<'_>,
-) -> PyResult<Plan> {
+/// The bank made ready for outputs of a format.
+pub(crate) fn plan(bank: &Bank, format: Format, algorithm: Algorithm) -> PyResult<Plan> {
     let options = Options { precision: Precision::of(format.number), algorithm, ..Options::default() };
-    bank.plan(settings.options(options)).map_err(refused)
+    bank.plan(options).map_err(refused)
 }
 
 /// What captures say of the spec of a bank.
@@ -115,7 +116,10 @@ pub(crate) fn fuse<'py>(
 
 fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Request) -> PyResult<Fused<'py>> {
     let (py, settings, frames) = (held.py(), request.settings(), held.frames());
-    let plan = plan(bank, format, request.algorithm, settings)?;
+    let asked = request.algorithm;
+    let algorithm = if settings.gaps.is_some() { asked.without_added_latency() } else { asked };
+    let plan = plan(bank, format, algorithm)?;
+    let latency_dropped = settings.dropped.samples(&plan);
     let mut array = NewArray::new(py, frames * bank.ratio, format)?;
     let (parts, mut room) = (held.parts()?, array.room()?);
     let parts: Vec<_> = parts.iter().map(Vec::as_slice).collect();
@@ -131,7 +135,7 @@ fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Reques
         y: array.finish()?,
         captures: Verdict::Unjudged.into(),
         frames,
-        latency_dropped: settings.dropped.samples(&plan),
+        latency_dropped,
         seconds: 0.0,
         number: format.number,
     })
@@ -152,9 +156,7 @@ impl Fused<'_> {
         let Self { y, outcome, captures, frames, latency_dropped, seconds, number } = self;
         let bytes = y.call_method1("view", ("u1",))?;
         let bytes = bytes.cast::<PyArray1<u8>>()?.try_readonly().map_err(refused)?;
-        let list = |gaps: &GapSummary| -> Vec<_> {
-            gaps.list.iter().map(|gap| (gap.channel, gap.first, gap.length)).collect()
-        };
+        let list = |gaps: &GapSummary| -> Vec<_> { gaps.list.iter().map(gap).collect() };
         Made::of(py, "FuseReport", outcome)?
             .with("frames", *frames)?
             .with("rate", rate)?
@@ -170,7 +172,12 @@ impl Fused<'_> {
     }
 }
 
-/// True where a byte is not 0.
-pub(crate) fn marks(py: Python<'_>, mask: &[u8]) -> Py<PyArray1<bool>> {
-    PyArray1::from_iter(py, mask.iter().map(|&mark| mark != 0)).unbind()
+/// A gap as (channel from 1, first sample, length, SNR in dB there).
+pub(crate) fn gap(gap: &Gap) -> (usize, u64, u64, f64) {
+    (gap.channel, gap.first, gap.length, gap.snr_db.0)
+}
+
+/// The marks as an array.
+pub(crate) fn marks(py: Python<'_>, mask: &[u8]) -> Py<PyArray1<u8>> {
+    PyArray1::from_slice(py, mask).unbind()
 }

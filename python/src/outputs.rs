@@ -7,6 +7,7 @@ use hybank::files::AtomicFile;
 use hybank::runtime::{Input, Isa, Output, PcmOutput, Sample};
 use numpy::{PyArray1, PyArrayMethods, PyReadwriteArray1};
 use pyo3::prelude::*;
+use pyo3::types::PySlice;
 use std::io::Write;
 use std::path::Path;
 
@@ -40,6 +41,12 @@ impl<'py> NewArray<'py> {
     /// The array.
     pub(crate) fn finish(self) -> PyResult<Bound<'py, PyAny>> {
         self.bytes.as_any().call_method1("view", (self.format.name(),))
+    }
+
+    /// The array, cut after so many samples.
+    pub(crate) fn finish_first(self, samples: usize) -> PyResult<Bound<'py, PyAny>> {
+        let py = self.bytes.py();
+        self.finish()?.get_item(PySlice::new(py, 0, samples as isize, 1))
     }
 }
 

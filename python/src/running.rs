@@ -4,41 +4,46 @@ use crate::errors::refused;
 use crate::formats::Format;
 use hybank::bank::Bank;
 use hybank::io::IoError;
-use hybank::pipeline::{Block, DroppedLatency, GapPolicy, Pipeline, Settings};
+use hybank::pipeline::{Block, DroppedLatency, GapEstimator, Pipeline, Settings};
 use hybank::runtime::{PcmFrames, Plan};
 use pyo3::prelude::*;
 use std::io::Write;
+use std::sync::Arc;
 
 /// A run, which the end of a `with` block closes.
 pub(crate) struct Running {
     pub(crate) pipeline: Pipeline<'static>,
-    /// The marks of the outputs of the last call, if gaps are filled.
+    /// The marks of the outputs of the last call, if missing samples are estimated.
     pub(crate) mask: Vec<u8>,
     pub(crate) is_closed: bool,
 }
 
 impl Running {
     /// A run of `bank` at its beginning.
-    pub(crate) fn new(bank: &Bank, plan: &Plan, format: Format, gaps: Option<GapPolicy>) -> Self {
+    pub(crate) fn new(bank: &Bank, plan: &Plan, format: Format, gaps: Option<Arc<dyn GapEstimator>>) -> Self {
         let settings = Settings { dropped: DroppedLatency::Nothing, gaps, ..Settings::default() };
         let pipeline = Pipeline::new(bank, plan, settings, format.number, format.complex);
         Self { pipeline, mask: Vec::new(), is_closed: false }
     }
 
-    /// Filters frames into `room`, which has their size.
-    pub(crate) fn push(&mut self, recordings: &[PcmFrames<'_>], mut room: &mut [u8]) -> PyResult<()> {
+    /// Filters frames into `room`, which has their size; returns how many samples came out.
+    pub(crate) fn push(&mut self, recordings: &[PcmFrames<'_>], mut room: &mut [u8]) -> PyResult<usize> {
         self.begin()?;
         let Self { pipeline, mask, .. } = self;
-        pipeline.push(recordings, &mut |block| keep(block, &mut room, mask)).map_err(refused)
+        let before = pipeline.samples();
+        pipeline.push(recordings, &mut |block| keep(block, &mut room, mask)).map_err(refused)?;
+        Ok((pipeline.samples() - before) as usize)
     }
 
-    /// The last samples of a stream: as many frames of them as the latency has.
-    pub(crate) fn drain(&mut self, mut room: &mut [u8]) -> PyResult<()> {
+    /// The last samples of a stream: those of the frames that wait for later ones, and as many frames as the
+    /// latency has; returns how many.
+    pub(crate) fn drain(&mut self, mut room: &mut [u8]) -> PyResult<usize> {
         self.begin()?;
         let Self { pipeline, mask, .. } = self;
-        let plan = pipeline.plan();
-        let samples = pipeline.samples() + (plan.flush_frames() * plan.ratio()) as u64;
-        pipeline.flush(samples, &mut |block| keep(block, &mut room, mask)).map_err(refused)
+        let (before, plan) = (pipeline.samples(), pipeline.plan());
+        let samples = before + pipeline.pending() + (plan.flush_frames() * plan.ratio()) as u64;
+        pipeline.flush(samples, &mut |block| keep(block, &mut room, mask)).map_err(refused)?;
+        Ok((samples - before) as usize)
     }
 
     fn begin(&mut self) -> PyResult<()> {

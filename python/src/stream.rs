@@ -4,11 +4,11 @@ use crate::arrays::{Held, Shape, framed};
 use crate::bank::Bank as PyBank;
 use crate::errors::{no_others, refused};
 use crate::formats::Format;
-use crate::fuse::{marks, parse_algorithm, plan};
+use crate::fuse::{gap, marks, parse_algorithm, plan};
 use crate::outputs::NewArray;
 use crate::running::Running;
 use hybank::bank::Bank;
-use hybank::pipeline::{GapPolicy, Pipeline, Settings};
+use hybank::pipeline::{GapEstimator, Pipeline};
 use hybank::runtime::Plan;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -26,7 +26,7 @@ pub(crate) struct Stream {
     plan: Plan,
     shape: Shape,
     format: Format,
-    gaps: Option<GapPolicy>,
+    gaps: Option<Arc<dyn GapEstimator>>,
     running: Mutex<Running>,
 }
 
@@ -40,14 +40,14 @@ impl Stream {
         axis: isize,
         dtype: Option<&Bound<'_, PyAny>>,
         algorithm: &str,
-        gaps: Option<GapPolicy>,
+        gaps: Option<Arc<dyn GapEstimator>>,
     ) -> PyResult<Self> {
         let format = dtype.map_or(Ok(Format::F32), Format::of_dtype)?;
         let shape = Shape { axis, channels: bank.frame_samples() };
         shape.check()?;
         let asked = parse_algorithm(algorithm)?.without_added_latency();
-        let plan = plan(bank, format, asked, Settings { gaps, ..Settings::default() })?;
-        let running = Mutex::new(Running::new(bank, &plan, format, gaps));
+        let plan = plan(bank, format, asked)?;
+        let running = Mutex::new(Running::new(bank, &plan, format, gaps.clone()));
         Ok(Self { bank: Arc::clone(bank), asked: algorithm.to_owned(), plan, shape, format, gaps, running })
     }
 
@@ -85,23 +85,25 @@ impl Stream {
         self.check_parts(held.format)?;
         let mut array = NewArray::new(x.py(), held.frames() * self.plan.ratio(), self.format)?;
         let (recordings, room) = (held.recordings()?, array.bytes()?);
-        x.py().detach(|| self.lock().push(&recordings, room))?;
-        array.finish()
+        let samples = x.py().detach(|| self.lock().push(&recordings, room))?;
+        array.finish_first(samples)
     }
 
     #[doc = include_str!("docs/Stream.flush.rst")]
     fn flush<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let mut array = NewArray::new(py, self.plan.flush_frames() * self.plan.ratio(), self.format)?;
+        let waiting = self.gaps.as_ref().map_or(0, |gaps| gaps.reach());
+        let most = (waiting + self.plan.flush_frames()) * self.plan.ratio();
+        let mut array = NewArray::new(py, most, self.format)?;
         let room = array.bytes()?;
-        py.detach(|| self.lock().drain(room))?;
-        array.finish()
+        let samples = py.detach(|| self.lock().drain(room))?;
+        array.finish_first(samples)
     }
 
     #[doc = include_str!("docs/Stream.reset.rst")]
     fn reset(&self, py: Python<'_>) {
         py.detach(|| {
             let mut running = self.lock();
-            let new = Running::new(&self.bank, &self.plan, self.format, self.gaps);
+            let new = Running::new(&self.bank, &self.plan, self.format, self.gaps.clone());
             *running = Running { is_closed: running.is_closed, ..new };
         });
     }
@@ -167,21 +169,22 @@ impl Stream {
         self.read(py, Pipeline::state_resets)
     }
 
-    /// The gaps so far as (channel from 1, first sample, length): those that have ended, then those that go
-    /// on. None unless gaps are filled.
+    /// The gaps so far as (channel from 1, first sample, length, SNR in dB there): those that have ended,
+    /// then those that go on. None unless missing samples are estimated.
     #[getter]
-    fn gaps(&self, py: Python<'_>) -> Option<Vec<(usize, u64, u64)>> {
-        self.gaps?;
+    fn gaps(&self, py: Python<'_>) -> Option<Vec<(usize, u64, u64, f64)>> {
+        self.gaps.as_ref()?;
         Some(self.read(py, |pipeline| {
             let gaps = pipeline.gaps().iter().copied().chain(pipeline.open_gaps());
-            gaps.map(|gap| (gap.channel, gap.first, gap.length)).collect()
+            gaps.map(|one| gap(&one)).collect()
         }))
     }
 
-    /// True where a missing sample affects the outputs of the last call. None unless gaps are filled.
+    /// For each output of the last call 0 if no missing sample affects it, else its predicted SNR in dB,
+    /// from 1 to 255. None unless missing samples are estimated.
     #[getter]
-    fn mask(&self, py: Python<'_>) -> Option<Py<PyArray1<bool>>> {
-        self.gaps?;
+    fn mask(&self, py: Python<'_>) -> Option<Py<PyArray1<u8>>> {
+        self.gaps.as_ref()?;
         let mask = py.detach(|| self.lock().mask.clone());
         Some(marks(py, &mask))
     }
@@ -246,9 +249,9 @@ impl Stream {
 
 impl Stream {
     fn check_stateful(&self) -> PyResult<()> {
-        match self.gaps {
+        match &self.gaps {
             Some(_) => Err(refused(
-                "a stream that fills gaps cannot be copied, pickled or resumed; begin another one",
+                "a stream that estimates missing samples cannot be copied, pickled or resumed; begin another one",
             )),
             None => Ok(()),
         }

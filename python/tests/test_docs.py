@@ -38,6 +38,6 @@ def test_the_snippets_run_and_say_what_is_true(tmp_path, monkeypatch):
             want = names["bank"].fuse(names["x"], keep_latency=True)
             np.testing.assert_allclose(names["causal"], want, atol=1e-10)
         if "full_output" in snippet:
-            assert names["report"].gaps == [(2, 100, 4)] and names["report"].mask.any()
+            assert names["report"].gaps[0][:3] == (2, 100, 4) and names["report"].mask.any()
     if missing:
         pytest.skip(f"all snippets hold, except those of {', '.join(sorted(missing))}, which is not installed")

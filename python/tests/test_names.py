@@ -60,7 +60,7 @@ def test_a_wrong_keyword_is_answered_with_the_right_one(fir):
         (lambda: hb.analyze(fir, delaybox=1), "did you mean 'delay_box'"),
         (lambda: hb.butterworth(3, cutof=1), "did you mean 'cutoff'"),
         (lambda: hb.Channel(dealy=1), "did you mean 'delay'"),
-        (lambda: fir.fuse(np.zeros((2, 4)), gabs="hold"), "did you mean 'gaps'"),
+        (lambda: fir.fuse(np.zeros((2, 4)), gabs=True), "did you mean 'gaps'"),
         (lambda: fir.stream(algoritm="direct"), "did you mean 'algorithm'"),
         (lambda: fir.export("x", format="c", nome="y"), "did you mean 'name'"),
         (lambda: hb.verify(fir, zzz=1), "it takes bank, search"),

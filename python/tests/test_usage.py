@@ -24,7 +24,7 @@ bank.save("bank.json"); bank = hb.load("bank.json")
 bank.gamma.upper; bank.taps; bank.ss; bank.latency
 f, e = bank.error_response(512)
 y = bank.fuse(x)
-y, info = bank.fuse(x, gaps="hold", dtype="f4", threads=2, full_output=True)
+y, info = bank.fuse(x, gaps=True, dtype="f4", threads=2, full_output=True)
 with bank.stream(axis=0) as s:
     s.latency, s.memory, s.alignment, s.state
     for block in blocks("in.wav", 4096): sink(s.process(block))

@@ -91,8 +91,56 @@ impl RootCovariance {
         self.rest[row] + (0..self.samples.ncols()).map(|k| left(k).powi(2)).sum::<f64>()
     }
 
+    /// The estimates from some of the samples alone, which stand in the order of the history.
+    pub(super) fn of_known(&self, known: &[usize]) -> PartialHistory<'_> {
+        let (samples, basis) = linalg::lq(&self.samples.select_rows(known));
+        PartialHistory { whole: self, samples, basis }
+    }
+
     fn row(&self, instant: i64) -> usize {
         (instant - self.first) as usize
+    }
+}
+
+/// A history of which some samples are missing.
+///
+/// With `y = L_y u` the known samples are `K Q u`, with a triangular K and orthonormal rows Q, so `v = Q u`
+/// is what they tell. A random variable `a u` has the estimate `a Q' v` from them.
+#[derive(Debug)]
+pub(super) struct PartialHistory<'a> {
+    whole: &'a RootCovariance,
+    /// K.
+    samples: Mat,
+    /// Q.
+    basis: Mat,
+}
+
+/// An estimate from known samples.
+#[derive(Debug)]
+pub(super) struct Estimate {
+    /// The weights of the known samples.
+    pub(super) weights: Vec<f64>,
+    /// The mean square of its error.
+    pub(super) error: f64,
+}
+
+impl PartialHistory<'_> {
+    /// The estimate of a sample of the history.
+    pub(super) fn sample(&self, place: usize) -> Estimate {
+        let own = self.whole.samples.row(place);
+        let projection = own * self.basis.transpose();
+        let error = (own - &projection * &self.basis).norm_squared();
+        // Every sample has noise, so none of the known ones follows from the others.
+        let weights = self.samples.tr_solve_lower_triangular(&projection.transpose());
+        Estimate { weights: weights.map_or_else(Vec::new, |weights| weights.as_slice().to_vec()), error }
+    }
+
+    /// The error of the estimate of the target at `instant`.
+    pub(super) fn target_error(&self, instant: i64) -> f64 {
+        let row = self.whole.row(instant);
+        let own = self.whole.projections.row(row);
+        let projection = own * self.basis.transpose();
+        self.whole.rest[row] + (own - projection * &self.basis).norm_squared()
     }
 }
 

@@ -5,11 +5,9 @@ use super::reconstruction::Reconstruction;
 use crate::bank::Bank;
 use crate::design::filters::FilterResponse;
 use crate::design::{DesignError, Deviations, Problem, Signal};
-use crate::spec::{Spec, USUAL_RMS};
+use crate::spec::{ROUNDING_16_BITS, Spec, USUAL_RMS};
 use crate::units::Decibels;
 
-/// Variance of the rounding to 16 bits of a full scale from -1 to 1: step^2 / 12.
-const ROUNDING_16_BITS: f64 = 1.0 / (12.0 * (1u64 << 30) as f64);
 /// Variance of the target over the variance of the error and of its parts, averaged over time.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct Snr {

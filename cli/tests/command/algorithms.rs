@@ -13,8 +13,13 @@ fn desk() -> Desk {
         (0..600).map(|t| ((t * 37 + seed * 11) % 101) as f64 / 1000.0 - 0.05).collect()
     };
     let channel = |seed| serde_json::json!({ "delay": 0.0, "taps": taps(seed) });
+    let spec = serde_json::json!({
+        "fast_period": 1.0, "ratio": 2, "latency": 7,
+        "target": { "filter": { "family": "butterworth", "order": 2, "cutoff": 0.4 } },
+        "channel": [{ "delay": 0.0 }, { "delay": 0.0 }], "design": { "method": "fir", "taps": 600 }
+    });
     let bank = serde_json::json!({
-        "format": "hybank-bank", "version": 1, "spec": null, "fast_period": 1.0, "ratio": 2, "latency": 7,
+        "format": "hybank-bank", "version": 1, "spec": spec, "fast_period": 1.0, "ratio": 2, "latency": 7,
         "method": "fir", "channels": [channel(1), channel(2)], "state_space": null,
         "gamma": { "upper": null, "lower": null, "noncausal": null }
     });
@@ -106,10 +111,10 @@ fn stream_is_late_only_when_asked_to_be() {
 #[test]
 fn masks_line_up_with_every_form() {
     let desk = desk();
-    let gaps = ["--gaps", "hold", "--mask", "mask"];
+    let gaps = ["--gaps", "--mask", "mask"];
     let (direct, report) = fuse(&desk, &[&gaps[..], &["--algorithm", "direct"]].concat());
     let (mask, list) = (desk.read("mask"), &report["gaps"]);
-    assert!(mask.contains(&1) && mask.contains(&0) && mask.len() == direct.len());
+    assert!(mask.iter().any(|mark| *mark > 0) && mask.contains(&0) && mask.len() == direct.len());
     let (other, report) = fuse(&desk, &[&gaps[..], &["--algorithm", "overlap-save"]].concat());
     same(&other, &direct);
     assert_eq!((&desk.read("mask"), &report["gaps"]), (&mask, list));

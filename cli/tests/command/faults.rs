@@ -64,12 +64,12 @@ fn a_full_standard_output_is_an_error_of_one_line() {
 /// What has no sample yet is not kept for the sake of what was recorded.
 #[test]
 fn streams_that_fail_before_their_first_sample_leave_nothing() {
-    let desk = Desk::new();
+    let desk = Desk::with_model();
     desk.write("odd.wav", b"RIFF....WAVEnothing");
     for args in [
         "--input none --input none -o out.f32",
         "-o out.sigmf-meta <.",
-        "-o out.f32 --gaps mask --mask out.mask <.",
+        "-o out.f32 --gaps --mask out.mask <.",
         "--input odd.wav --format wav -o out.wav",
         "-o out.f32 <.",
     ] {
@@ -120,13 +120,13 @@ fn end_by_signals(child: &mut Child) {
 
 #[test]
 fn a_second_signal_ends_a_run_whose_output_nobody_takes() {
-    let desk = Desk::new();
+    let desk = Desk::with_model();
     // More than any pipe holds.
     desk.write("in", bytes(&frames(1 << 20)));
     let before = names(&desk.path(""));
     let mut child = Command::new(env!("CARGO_BIN_EXE_hybank"))
         .current_dir(desk.path(""))
-        .args(["stream", "bank.json", "--input", "in", "--gaps", "zero", "--mask", "mask"])
+        .args(["stream", "bank.json", "--input", "in", "--gaps", "--mask", "mask"])
         .stdout(Stdio::piped())
         .spawn()
         .unwrap();
@@ -141,12 +141,11 @@ fn a_second_signal_ends_a_run_whose_output_nobody_takes() {
 
 #[test]
 fn inputs_without_end_are_refused_with_their_bound() {
-    let desk = Desk::new();
+    let desk = Desk::with_model();
     desk.write("in", bytes(&[1.0; 20]));
     let bound = "longer than 67108864 bytes, the most that a spec or bank file may have";
     desk.refused(1, &["verify", "/dev/zero"], &["/dev/zero", bound]);
-    let stream =
-        ["stream", "bank.json", "--input", "in", "--input", "in", "-o", "out", "--gaps", "zero", "--lost"];
+    let stream = ["stream", "bank.json", "--input", "in", "--input", "in", "-o", "out", "--gaps", "--lost"];
     desk.refused(1, &[&stream[..], &["/dev/zero"]].concat(), &["/dev/zero", "longer than", "lost samples"]);
     desk.write("lost", "{\"channel\":1,\"sample_start\":0,\"global_index\":0}\n{\"channel\":1,\"sample_start\":1,\"global_index\":4000000000}");
     let refused = [&stream[..], &["lost"]].concat();

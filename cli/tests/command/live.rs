@@ -45,32 +45,33 @@ fn json_lines(text: &[u8]) -> Vec<Value> {
 
 #[test]
 fn gaps_clipping_and_stalls_are_told_while_they_happen() {
-    let desk = Desk::new();
+    let desk = Desk::with_model();
     ["a", "b"].iter().for_each(|name| fifo(&desk, name));
-    let inputs = ["--input", "a", "--input", "b", "--gaps", "zero", "--output-format", "s16le"];
+    let inputs = ["--input", "a", "--input", "b", "--gaps", "--output-format", "s16le"];
     let reported = ["--report", "report", "--json"];
     let mut child = desk.spawn(&[&["stream", "bank.json"], &inputs[..], &reported].concat());
     let said = lines(&mut child);
     // Multiples of 2^-9, so that 16 bits hold every sum of the small ones; the large ones clip.
-    let (mut a, mut b) = (vec![1.0 / 512.0; 40], vec![-1.0 / 512.0; 40]);
+    let (mut a, mut b) = (vec![1.0 / 512.0; 90], vec![-1.0 / 512.0; 90]);
     a[3] = f32::NAN;
-    b[20..25].fill(f32::NAN);
+    b[60..65].fill(f32::NAN);
     a[8] = 1.0;
     let (mut first, mut second) = (writer(&desk, "a"), writer(&desk, "b"));
     first.write_all(&bytes(&a)).unwrap();
-    second.write_all(&bytes(&b[..10])).unwrap();
+    // Estimates look 24 frames ahead.
+    second.write_all(&bytes(&b[..50])).unwrap();
     let mut lines: Vec<String> = (0..3).map(|_| said.recv_timeout(PATIENCE).unwrap()).collect();
     lines.sort();
     // Taps 2, 3 and 4 times 1 saturate; with tap 1 the other samples keep the sum below 1.
     assert!(lines[0].starts_with("hybank: clipped: 3 of the output samples"), "{lines:?}");
-    let want = ["hybank: gap: channel 1, sample 3, 1 missing", "hybank: waiting for channel 2 (b)"];
-    assert_eq!(lines[1..], want);
+    assert!(lines[1].starts_with("hybank: gap: channel 1, sample 3, 1 missing, SNR "), "{lines:?}");
+    assert_eq!(lines[2], "hybank: waiting for channel 2 (b)");
     // The report can be read before the end.
     let events: Vec<_> = json_lines(&desk.read("report"));
     let of = |kind: &str| events.iter().find(|event| event["event"] == kind).unwrap();
     assert_eq!((of("gap")["channel"].as_u64(), of("gap")["first"].as_u64()), (Some(1), Some(3)));
     assert_eq!((of("clipped")["samples"].as_u64(), &of("stall")["channels"]), (Some(3), &json!([2, 2])));
-    second.write_all(&bytes(&b[10..])).unwrap();
+    second.write_all(&bytes(&b[50..])).unwrap();
     until(&said, "channel 2 (b) goes on after");
     drop((first, second));
     let mut samples = Vec::new();
@@ -81,14 +82,16 @@ fn gaps_clipping_and_stalls_are_told_while_they_happen() {
     let want: Vec<i16> =
         fused(&whole).iter().map(|y| (y * 32768.0).clamp(-32768.0, 32767.0) as i16).collect();
     let got: Vec<i16> = samples.chunks_exact(2).map(|b| i16::from_le_bytes([b[0], b[1]])).collect();
-    assert_eq!(got, want);
+    // The four taps of a filter touch two frames.
+    let is_whole = |k: usize| !(3..5).contains(&(k / 2)) && !(60..66).contains(&(k / 2));
+    assert!(got.len() == want.len() && (0..got.len()).all(|k| !is_whole(k) || got[k] == want[k]));
     // Samples have standard output, so the JSON object is on standard error; the report ends with the same.
     let rest: Vec<String> = said.iter().collect();
     assert!(rest.iter().any(|line| line.contains("gap: 2 in all, 6 samples missing")), "{rest:?}");
     let printed: Value = serde_json::from_str(rest.last().unwrap()).unwrap();
     let events = json_lines(&desk.read("report"));
     let summary = events.last().unwrap();
-    assert_eq!((summary["event"].as_str(), summary["samples"].as_u64()), (Some("summary"), Some(80)));
+    assert_eq!((summary["event"].as_str(), summary["samples"].as_u64()), (Some("summary"), Some(180)));
     for key in ["samples", "clipped", "gaps", "warnings", "plan", "frames"] {
         assert_eq!(summary[key], printed[key], "{key}");
     }

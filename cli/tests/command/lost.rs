@@ -2,6 +2,7 @@
 
 use crate::support::{Desk, bytes, channel, floats, frames, fused, wav};
 use serde_json::{Value, json};
+use trials::random::Random;
 
 const COUNT: usize = 3000;
 
@@ -18,23 +19,10 @@ fn is_lost(frame: usize) -> bool {
     frame < 2 || frame == 7 || (100..1500).contains(&frame)
 }
 
-fn gaps(list: &[(u64, u64, u64)]) -> Value {
-    let gap = |&(channel, first, length): &_| json!({ "channel": channel, "first": first, "length": length });
-    Value::Array(list.iter().map(gap).collect())
-}
-
-/// Frames with channel 1 replaced by `stand_in(last good sample)` where it was lost.
-fn filled(whole: &[f32], stand_in: impl Fn(f32) -> f32) -> Vec<f32> {
-    let mut frames = whole.to_vec();
-    let mut last = 0.0;
-    for (k, frame) in frames.chunks_exact_mut(2).enumerate() {
-        if is_lost(k) {
-            frame[0] = stand_in(last);
-        } else {
-            last = frame[0];
-        }
-    }
-    frames
+/// Channel, first sample and length of each gap.
+fn places(gaps: &Value) -> Vec<[u64; 3]> {
+    let place = |gap: &Value| ["channel", "first", "length"].map(|key| gap[key].as_u64().unwrap());
+    gaps["list"].as_array().unwrap().iter().map(place).collect()
 }
 
 fn kept(whole: &[f32]) -> Vec<f32> {
@@ -46,19 +34,19 @@ fn kept(whole: &[f32]) -> Vec<f32> {
 fn check_mask(mask: &[u8], got: &[f32], whole: &[f32]) {
     assert_eq!(mask.len(), got.len());
     for (t, ((mask, got), want)) in mask.iter().zip(got).zip(whole).enumerate() {
-        // f_1 has no zero tap, and no lost sample of the test is replaced by itself.
+        // f_1 has no zero tap, and no lost sample of the test is estimated exactly.
         assert_eq!(*mask == 0, got == want, "sample {t}");
     }
 }
 
-/// Samples that are never what stands in for them.
+/// Samples that nothing around them tells.
 fn whole() -> Vec<f32> {
     (0..2 * COUNT).map(|i| (1 + i % 1021) as f32).collect()
 }
 
 #[test]
 fn samples_that_were_left_out_are_bridged_reported_and_masked() {
-    let desk = Desk::new();
+    let desk = Desk::with_model();
     let whole = whole();
     desk.write("a", bytes(&kept(&whole)));
     desk.write("b", bytes(&channel(&whole, 1)));
@@ -68,36 +56,32 @@ fn samples_that_were_left_out_are_bridged_reported_and_masked() {
     let lost = ["--lost", "lost.jsonl", "--mask", "mask"];
     let stream = ["stream", "bank.json", "--input", "a", "--input", "b", "-o", "out"];
     let fuse = ["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--keep-latency"];
-    for (policy, hold) in [("zero", 0.0), ("mask", 0.0), ("hold", 1.0)] {
-        let want = fused(&filled(&whole, |last| hold * last));
-        for command in [&stream[..], &fuse] {
-            let report = desk.report(&[command, &lost, &["--gaps", policy]].concat());
-            assert_eq!(report["gaps"]["list"], gaps(&[(1, 0, 2), (1, 7, 1), (1, 100, 1400)]));
-            assert_eq!(
-                (report["gaps"]["missing"].as_u64(), report["frames"].as_u64()),
-                (Some(1403), Some(3000))
-            );
-            assert_eq!(report["replaced"], 0);
-            let got = match command[0] {
-                "stream" => floats(&desk.read("out")),
-                _ => wav::samples(&desk, "out.wav"),
-            };
-            assert!(got == want, "{policy}");
-            check_mask(&desk.read("mask"), &got, &fused(&whole));
-        }
+    let mut outputs = Vec::new();
+    for command in [&stream[..], &fuse] {
+        let report = desk.report(&[command, &lost, &["--gaps"]].concat());
+        assert_eq!(places(&report["gaps"]), [[1, 0, 2], [1, 7, 1], [1, 100, 1400]]);
+        assert_eq!((report["gaps"]["missing"].as_u64(), report["frames"].as_u64()), (Some(1403), Some(3000)));
+        assert_eq!(report["replaced"], 0);
+        let got = match command[0] {
+            "stream" => floats(&desk.read("out")),
+            _ => wav::samples(&desk, "out.wav"),
+        };
+        check_mask(&desk.read("mask"), &got, &fused(&whole));
+        outputs.push((got, desk.read("mask")));
     }
+    assert!(outputs[0] == outputs[1]);
 }
 
 #[test]
 fn void_samples_of_an_interleaved_stream_are_in_the_report_of_another_run() {
-    let desk = Desk::new();
+    let desk = Desk::with_model();
     let clean = frames(500);
     let mut marked = clean.clone();
     for (channel, range) in [(0, 0..1), (1, 40..43), (0, 41..300), (1, 499..500)] {
         range.for_each(|k: usize| marked[2 * k + channel] = f32::NAN);
     }
     desk.write("marked", bytes(&marked));
-    let args = ["stream", "bank.json", "--gaps", "hold", "--mask", "mask", "-o", "out"];
+    let args = ["stream", "bank.json", "--gaps", "--mask", "mask", "-o", "out"];
     let report = desk.report(&[&args[..], &["--input", "marked"]].concat());
     let list = report["gaps"]["list"].as_array().unwrap();
     assert_eq!(list.len(), 4);
@@ -117,20 +101,18 @@ fn void_samples_of_an_interleaved_stream_are_in_the_report_of_another_run() {
 
 #[test]
 fn channels_that_end_early_may_be_bridged_to_the_end_of_the_longest() {
-    let desk = Desk::new();
+    let desk = Desk::with_model();
     let whole = frames(5000);
     desk.write("a", bytes(&channel(&whole, 0)[..4000]));
     desk.write("b", bytes(&channel(&whole, 1)));
-    let args = ["stream", "bank.json", "--input", "a", "--input", "b", "-o", "out", "--gaps", "zero"];
+    let args = ["stream", "bank.json", "--input", "a", "--input", "b", "-o", "out", "--gaps"];
     let report = desk.report(&args);
     assert_eq!((report["frames"].as_u64(), report["gaps"]["count"].as_u64()), (Some(4000), Some(0)));
     assert_eq!(report["warnings"].as_array().unwrap().len(), 1);
     let report = desk.report(&[&args[..], &["--longest", "--strict"]].concat());
     assert_eq!((report["frames"].as_u64(), &report["warnings"]), (Some(5000), &json!([])));
-    assert_eq!(report["gaps"]["list"], gaps(&[(1, 4000, 1000)]));
-    let mut zeros = whole.clone();
-    zeros.chunks_exact_mut(2).skip(4000).for_each(|frame| frame[0] = 0.0);
-    assert!(floats(&desk.read("out")) == fused(&zeros));
+    assert_eq!(places(&report["gaps"]), [[1, 4000, 1000]]);
+    assert!(floats(&desk.read("out"))[..8000] == fused(&whole)[..8000]);
     desk.refused(2, &["stream", "bank.json", "--longest"], &["--gaps"]);
 }
 
@@ -169,7 +151,7 @@ fn sigmf_that_is_not_all_samples_is_read_or_refused() {
 
 #[test]
 fn captures_tell_stream_what_was_lost() {
-    let desk = Desk::new();
+    let desk = Desk::with_model();
     let whole = whole();
     let captures = r#"{ "core:sample_start": 10, "core:global_index": 1002 },
         { "core:sample_start": 15, "core:global_index": 1008 }, { "core:sample_start": 50 },
@@ -184,15 +166,79 @@ fn captures_tell_stream_what_was_lost() {
     );
     desk.write("b.sigmf-data", bytes(&channel(&whole, 1)));
     let args = ["stream", "bank.json", "--input", "a.sigmf-meta", "--input", "b.sigmf-meta", "-o", "out"];
-    let report = desk.report(&[&args[..], &["--gaps", "hold", "--mask", "mask"]].concat());
-    assert_eq!(report["gaps"]["list"], gaps(&[(1, 0, 2), (1, 7, 1), (1, 100, 1400)]));
+    let report = desk.report(&[&args[..], &["--gaps", "--mask", "mask"]].concat());
+    assert_eq!(places(&report["gaps"]), [[1, 0, 2], [1, 7, 1], [1, 100, 1400]]);
     let got = floats(&desk.read("out"));
-    assert!(got == fused(&filled(&whole, |last| last)));
     check_mask(&desk.read("mask"), &got, &fused(&whole));
     // What is void is reported beside the captures; what is left out only once.
     desk.write("lost", r#"{"channel": 2, "first": 2990, "length": 3}"#);
-    let both = [&args[..], &["--gaps", "hold", "--lost", "lost"]].concat();
-    assert_eq!(desk.report(&both)["gaps"]["list"][3], gaps(&[(2, 2990, 3)])[0]);
+    let both = [&args[..], &["--gaps", "--lost", "lost"]].concat();
+    assert_eq!(places(&desk.report(&both)["gaps"])[3], [2, 2990, 3]);
     desk.write("lost", r#"{"channel": 2, "sample_start": 0, "global_index": 3}"#);
     desk.refused(1, &[&both[..], &["--force"]].concat(), &["b.sigmf-meta", "captures of its own"]);
+}
+
+/// A signal in the band of a bank whose converters lost samples: one alone, ten of one converter, three of
+/// both. The predicted ratio of each gap is the measured one.
+#[test]
+fn lost_samples_of_a_signal_are_estimated_as_well_as_predicted() {
+    let desk = Desk::with_spec(
+        "fast_rate = 48000\nratio = 2\n[target]\nfilter = { family = \"butterworth\", order = 4, cutoff = 14000 }\n\
+         [signal]\nband = 18000\n[[channel]]\ndelay = 0\n[[channel]]\ndelay = \"1.1 samples\"\n\
+         [design]\nmethod = \"h2\"\ntaps = 64\n",
+    );
+    desk.good(&["design", "spec.toml", "-o", "bank.json"]);
+    let mut random = Random(3);
+    let tones: Vec<[f64; 3]> = (0..400)
+        .map(|_| {
+            let frequency: f64 = 9000.0 * (random.sample() + 1.0);
+            let passed = 1.0 / (1.0 + (frequency / 14000.0).powi(8)).sqrt();
+            [frequency, random.sample() * passed, std::f64::consts::PI * random.sample()]
+        })
+        .collect();
+    let power: f64 = tones.iter().map(|tone| tone[1] * tone[1] / 2.0).sum();
+    let scale = 0.25 / power.sqrt();
+    let value = |t: f64| -> f64 {
+        let tone = |[frequency, size, phase]: &[f64; 3]| {
+            size * (std::f64::consts::TAU * frequency * t + phase).cos()
+        };
+        scale * tones.iter().map(tone).sum::<f64>()
+    };
+    let rounded = |t: f64| ((value(t) * 32768.0).round() / 32768.0) as f32;
+    let mut a: Vec<f32> = (0..12_200).map(|k| rounded(f64::from(k) / 24000.0)).collect();
+    let mut b: Vec<f32> = (0..12_200).map(|k| rounded(f64::from(k) / 24000.0 - 1.1 / 48000.0)).collect();
+    // Every 100 frames a gap; its kind by its number.
+    let kinds = [(1, true, false), (10, false, true), (3, true, true)];
+    for number in 0..117 {
+        let (first, (length, of_a, of_b)) = (200 + 100 * number, kinds[number % 3]);
+        let lose = |samples: &mut [f32]| samples[first..first + length].fill(f32::NAN);
+        if of_a {
+            lose(&mut a);
+        }
+        if of_b {
+            lose(&mut b);
+        }
+    }
+    wav::write(&desk, "a.wav", 1, 24_000, &a);
+    wav::write(&desk, "b.wav", 1, 24_000, &b);
+    let report =
+        desk.report(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--gaps", "--mask", "mask"]);
+    let (out, mask) = (wav::samples(&desk, "out.wav"), desk.read("mask"));
+    let error = |n: usize| (f64::from(out[n]) - value(n as f64 / 48000.0)).powi(2);
+    let ratio = |places: &[usize]| {
+        10.0 * (0.0625 * places.len() as f64 / places.iter().map(|&n| error(n)).sum::<f64>()).log10()
+    };
+    for (kind, (length, _, of_b)) in kinds.into_iter().enumerate() {
+        let gaps = (kind..117).step_by(3).map(|number| 200 + 100 * number);
+        // The place in the gap where the error is largest.
+        let of_place = |place: usize| ratio(&gaps.clone().map(|first| 2 * first + place).collect::<Vec<_>>());
+        let worst = (0..2 * length).map(of_place).fold(f64::INFINITY, f64::min);
+        let channel = if of_b { 2 } else { 1 };
+        let list = report["gaps"]["list"].as_array().unwrap();
+        let gap = list.iter().find(|gap| gap["channel"] == channel && gap["length"] == length).unwrap();
+        let predicted = gap["snr_db"].as_f64().unwrap();
+        assert!((worst - predicted).abs() < 3.0, "{length}: {worst} measured, {predicted} predicted");
+    }
+    let clean: Vec<usize> = (200..23_400).filter(|&n| mask[n] == 0).collect();
+    assert!(ratio(&clean) > 85.0, "{}", ratio(&clean));
 }

@@ -7,7 +7,7 @@ const FUSE: [&str; 6] = ["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav"]
 
 /// The small bank with two recordings.
 fn desk() -> Desk {
-    let desk = Desk::new();
+    let desk = Desk::with_model();
     wav::write_pair(&desk, &[0.25; 64], &[0.5; 64]);
     desk
 }
@@ -22,10 +22,9 @@ fn fuse<'a>(more: &[&'a str]) -> Vec<&'a str> {
 fn a_mask_is_a_file() {
     let desk = desk();
     assert!(Command::new("mkfifo").arg(desk.path("fifo")).status().unwrap().success());
-    let said =
-        desk.refused(1, &fuse(&["--gaps", "zero", "--mask", "fifo"]), &["fifo", "a device, pipe or socket"]);
+    let said = desk.refused(1, &fuse(&["--gaps", "--mask", "fifo"]), &["fifo", "a device, pipe or socket"]);
     assert!(said.contains("give the name of a file") && !said.contains("`-`"), "{said}");
-    desk.refused(2, &fuse(&["--gaps", "zero", "--mask", "-"]), &["--mask -", "give it a file"]);
+    desk.refused(2, &fuse(&["--gaps", "--mask", "-"]), &["--mask -", "give it a file"]);
     // What may go to standard output says so.
     desk.write("spec.toml", THESIS);
     desk.refused(
@@ -37,13 +36,13 @@ fn a_mask_is_a_file() {
 
 /// They named the option that was missing, and not the one that was given.
 #[test]
-fn options_about_missing_samples_need_a_policy() {
+fn options_about_missing_samples_need_gaps() {
     let desk = desk();
     for (option, value) in
         [("--mask", Some("m")), ("--lost", Some("l")), ("--max-lost", Some("3")), ("--longest", None)]
     {
         let args: Vec<&str> = [option].into_iter().chain(value).collect();
-        let said = desk.refused(2, &fuse(&args), &[option, "without --gaps", "hold, zero or mask"]);
+        let said = desk.refused(2, &fuse(&args), &[option, "without --gaps", "give it too"]);
         assert!(!said.contains("required arguments"), "{said}");
     }
 }

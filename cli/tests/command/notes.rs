@@ -48,7 +48,7 @@ fn annotations(meta: &Value) -> Vec<(u64, u64, String)> {
 #[test]
 fn sigmf_keeps_what_it_is_for() {
     let desk = desk();
-    let inputs = ["--gaps", "zero", "--force"];
+    let inputs = ["--gaps", "--force"];
     let fuse = ["fuse", "bank.json", "a.sigmf-meta", "b.sigmf-meta", "-o", "fused.sigmf-meta"];
     let stream = ["stream", "bank.json", "--input", "a.sigmf-meta", "--input", "b.sigmf-meta"];
     let live = [&stream[..], &["-o", "live.sigmf-meta"]].concat();

@@ -8,7 +8,7 @@ use std::process::{Child, Command};
 
 /// A desk with the recordings a.wav and b.wav of two channels.
 fn desk() -> Desk {
-    let desk = Desk::new();
+    let desk = Desk::with_model();
     let frames = frames(100);
     wav(&desk, "a.wav", &channel(&frames, 0));
     wav(&desk, "b.wav", &channel(&frames, 1));
@@ -51,8 +51,7 @@ fn an_input_is_never_replaced_even_by_force() {
     for output in ["a.wav", "./b.wav", "same.wav", "link.wav", "bank.json"] {
         let args = ["fuse", "bank.json", "a.wav", "b.wav", "-o", output, "--force"];
         desk.refused(1, &args, &[output, "also the input"]);
-        let mask =
-            ["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--force", "--gaps", "zero", "--mask"];
+        let mask = ["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--force", "--gaps", "--mask"];
         desk.refused(1, &[&mask[..], &[output]].concat(), &[output, "also the input"]);
     }
     desk.write("spec.toml", crate::support::THESIS);
@@ -90,7 +89,7 @@ fn the_samples_of_a_sigmf_recording_are_an_input_too() {
 fn output_and_mask_are_two_files() {
     let desk = desk();
     let fuse = |output, mask| {
-        ["fuse", "bank.json", "a.wav", "b.wav", "--gaps", "mask", "--force", "-o", output, "--mask", mask]
+        ["fuse", "bank.json", "a.wav", "b.wav", "--gaps", "--force", "-o", output, "--mask", mask]
     };
     desk.refused(1, &fuse("out.wav", "./out.wav"), &["same file"]);
     desk.refused(1, &fuse("out.sigmf-meta", "out.sigmf-data"), &["same file"]);
@@ -141,8 +140,8 @@ fn of_two_runs_at_once_the_later_one_replaces_nothing() {
 
 #[test]
 fn output_and_mask_appear_together_or_not_at_all() {
-    let desk = Desk::new();
-    let args = ["-o", "out", "--gaps", "mask", "--mask", "mask"];
+    let desk = Desk::with_model();
+    let args = ["-o", "out", "--gaps", "--mask", "mask"];
     let child = waiting(&desk, &args, 2);
     desk.write("mask", "another's");
     let (code, message) = end(child);

@@ -145,19 +145,13 @@ fn converters_without_a_signal_give_silence() {
     first[0] = f64::NAN;
     let lossy: Vec<f32> = first.iter().map(|&x| x as f32).collect();
     wav::write(&desk, "lossy.wav", 1, rate, &lossy);
-    for more in [
-        &[][..],
-        &["--keep-latency"],
-        &["--gaps", "hold"],
-        &["--gaps", "zero"],
-        &["--algorithm", "overlap-save"],
-    ] {
+    for more in [&[][..], &["--keep-latency"], &["--gaps"], &["--algorithm", "overlap-save"]] {
         let args =
             [&["fuse", "bank.json", "lossy.wav", "cap/ch2.wav", "-o", "y.wav", "--force"], more].concat();
         // The missing samples are reported.
         assert!(desk.run(&args, &[]).status.success());
         let fused = recording(&desk.path("y.wav")).1;
-        assert!(fused.len() == 200 && fused.iter().all(|&y| y == 0.0), "{more:?}: {fused:?}");
+        assert!(fused.len() == 200 && fused.iter().all(|&y| y.abs() < 1e-7), "{more:?}: {fused:?}");
     }
     desk.good(&[
         "stream",

@@ -14,7 +14,7 @@ struct Bench(Desk);
 
 impl Bench {
     fn new() -> Self {
-        Self(Desk::new())
+        Self(Desk::with_model())
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -284,7 +284,7 @@ fn a_closed_pipe_ends_quietly() {
 #[test]
 fn a_closed_pipe_names_the_mask_that_stays() {
     let bench = Bench::new();
-    let mut child = bench.spawn(&["--gaps", "mask", "--mask", "mask"]);
+    let mut child = bench.spawn(&["--gaps", "--mask", "mask"]);
     let mut output = child.stdout.take().unwrap();
     let mut stdin = child.stdin.take().unwrap();
     let feeder = std::thread::spawn(move || while stdin.write_all(&[0; 65536]).is_ok() {});

@@ -77,8 +77,7 @@ fn recordings(text: &str) -> Vec<Case> {
         case("rows.npy", bytes, "fuse bank.json rows.npy -o out.wav")
     };
     let wav = |bytes: &[u8]| case("a.wav", bytes, "fuse bank.json a.wav b.wav -o out.wav");
-    let lost =
-        |line: String| case("lost", line, "fuse bank.json a.wav b.wav --gaps zero --lost lost -o out.wav");
+    let lost = |line: String| case("lost", line, "fuse bank.json a.wav b.wav --gaps --lost lost -o out.wav");
     let table = |text: String| case("both.csv", text, "fuse bank.json both.csv -o out.wav");
     vec![
         table(format!("time,{cell},b\n0,1,2\n1,{cell},4\n")),
@@ -190,7 +189,7 @@ fn foreign_names_and_arguments_are_quoted_and_bounded() {
             &["verify", text],
             &["fuse", "bank.json", text, "b.wav", "-o", "out.wav"],
             &["fuse", "bank.json", "a.wav", "b.wav", "-o", text],
-            &["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--gaps", "zero", "--lost", text],
+            &["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--gaps", "--lost", text],
             &["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--gaps", text],
             &["stream", "bank.json", "--input", text, "-o", "out"],
             &["stream", "bank.json", "--format", text],

@@ -17,12 +17,12 @@ const RUNS: [(&str, &str); 10] = [
     ("designed.json", "verify designed.json"),
     ("designed.json", "analyze designed.json"),
     ("spec.toml", "simulate spec.toml --source step@3 --samples 50 -o captures --force"),
-    ("a.wav", "fuse bank.json a.wav b.wav -o out.wav --force --gaps zero"),
-    ("both.sigmf-meta", "stream bank.json --input both.sigmf-meta --gaps hold -o out --force"),
-    ("both.sigmf-data", "stream bank.json --input both.sigmf-meta --gaps hold -o out --force"),
+    ("a.wav", "fuse bank.json a.wav b.wav -o out.wav --force --gaps"),
+    ("both.sigmf-meta", "stream bank.json --input both.sigmf-meta --gaps -o out --force"),
+    ("both.sigmf-data", "stream bank.json --input both.sigmf-meta --gaps -o out --force"),
     ("both.csv", "fuse bank.json both.csv -o out.wav --force"),
     ("rows.npy", "fuse bank.json rows.npy -o out.wav --force"),
-    ("lost", "stream bank.json --input raw --gaps zero --lost lost -o out --force"),
+    ("lost", "stream bank.json --input raw --gaps --lost lost -o out --force"),
 ];
 
 const META: &str = r#"{ "global": { "core:datatype": "rf32_le", "core:num_channels": 2, "core:version": "1.0.0" },

@@ -13,6 +13,11 @@ const BANK: &str = r#"{ "format": "hybank-bank", "version": 1, "spec": null, "fa
     { "delay": 0.0, "taps": [10, 20, 30, 0] }], "state_space": null,
     "gamma": { "upper": null, "lower": null, "noncausal": null } }"#;
 
+/// What the converters of [`BANK`] are: with it missing samples can be estimated.
+const MODEL: &str = r#"{ "fast_period": 1.0, "ratio": 2, "latency": 3,
+    "target": { "filter": { "family": "butterworth", "order": 2, "cutoff": 0.4 } },
+    "channel": [{ "delay": 0.0 }, { "delay": 0.0 }], "design": { "method": "fir", "taps": 4 } }"#;
+
 /// A temporary folder, removed at the end.
 pub(crate) struct Desk {
     folder: tempfile::TempDir,
@@ -27,6 +32,13 @@ impl Desk {
     pub(crate) fn new() -> Self {
         let desk = Self::empty();
         desk.write("bank.json", BANK);
+        desk
+    }
+
+    /// As [`Desk::new`], and the bank has a spec.
+    pub(crate) fn with_model() -> Self {
+        let desk = Self::empty();
+        desk.write("bank.json", BANK.replace("\"spec\": null", &format!("\"spec\": {MODEL}")));
         desk
     }
 

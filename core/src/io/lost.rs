@@ -67,6 +67,9 @@ struct Line {
     global_index: Option<u64>,
     first: Option<u64>,
     length: Option<u64>,
+    /// Of the gap report; not read.
+    #[serde(rename = "snr_db")]
+    _snr_db: Option<serde::de::IgnoredAny>,
 }
 
 /// What a line says.

@@ -1,20 +1,19 @@
 //! The one loop of all runs: fills gaps, filters, drops the latency and keeps the marks aligned.
 
-use super::gaps::GapFiller;
-use super::{Gap, GapPolicy, Outcome};
+use super::gaps::{GapEstimator, GapFiller};
+use super::{Gap, Outcome};
 use crate::bank::Bank;
-use crate::runtime::{
-    Input, Interleaved, Isa, Options, Output, Plan, ProcessError, SplitOutput, Stream, ThreadPool,
-};
+use crate::runtime::{Input, Interleaved, Isa, Output, Plan, ProcessError, SplitOutput, Stream, ThreadPool};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Settings of a run.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Settings<'a> {
     /// The output samples that are dropped at the beginning.
     pub dropped: DroppedLatency,
-    /// Replacement of missing samples. With `None` the runtime replaces NaN and infinity by 0.
-    pub gaps: Option<GapPolicy>,
+    /// What estimates missing samples. With `None` the runtime replaces NaN and infinity by 0.
+    pub gaps: Option<Arc<dyn GapEstimator>>,
     /// Threads for filtering; `None` uses the calling thread.
     pub workers: Option<&'a ThreadPool>,
 }
@@ -42,16 +41,6 @@ impl DroppedLatency {
     }
 }
 
-impl Settings<'_> {
-    /// `options` for a plan of such a run. Where gaps are filled, `Auto` is the direct algorithm: outputs
-    /// that no gap affects have the bits that they have without gaps.
-    pub fn options(&self, options: Options) -> Options {
-        let asked = options.algorithm;
-        let algorithm = if self.gaps.is_some() { asked.without_added_latency() } else { asked };
-        Options { algorithm, ..options }
-    }
-}
-
 /// Streams of one signal: one of real samples, two of the parts of complex ones, with their gaps.
 #[derive(Debug)]
 pub(super) struct Fusion<'a> {
@@ -68,7 +57,7 @@ pub(super) struct Fusion<'a> {
 impl<'a> Fusion<'a> {
     /// A new signal of so many parts through `plan`, which must be the plan of `bank`.
     pub(super) fn new(bank: &Bank, plan: &Plan, parts: usize, settings: Settings<'a>) -> Self {
-        let filler = |policy| GapFiller::new(bank, policy, parts, plan.extra_latency());
+        let filler = |estimator| GapFiller::new(bank, plan, parts, estimator);
         Self {
             streams: vec![Stream::new(plan); parts],
             gaps: settings.gaps.map(filler),
@@ -144,31 +133,68 @@ impl<'a> Fusion<'a> {
         most: usize,
         output: &mut dyn SplitOutput,
     ) -> Result<usize, ProcessError> {
-        let samples = parts.first().map_or(0, Input::frames) * self.stream().ratio();
+        let frames = parts.first().map_or(0, Input::frames);
+        match &mut self.gaps {
+            None => self.filter(parts, frames, most, output),
+            Some(gaps) => {
+                let wanted = self.streams[0].channels();
+                if let Some(given) = parts.iter().map(Input::channels).find(|given| *given != wanted) {
+                    return Err(ProcessError::Channels { given, wanted });
+                }
+                let frames = gaps.fill(parts);
+                self.filter_filled(frames, most, output)
+            }
+        }
+    }
+
+    /// Filters the frames that come out of the gap filler.
+    fn filter_filled(
+        &mut self,
+        frames: usize,
+        most: usize,
+        output: &mut dyn SplitOutput,
+    ) -> Result<usize, ProcessError> {
+        let Some(gaps) = self.gaps.take() else { return Ok(0) };
+        let filled = |part| Interleaved::new(gaps.filled(part), self.offsets.len());
+        let filled: Result<Vec<_>, _> = (0..self.parts()).map(filled).collect();
+        let written =
+            filled.map_err(ProcessError::from).and_then(|parts| self.filter(&parts, frames, most, output));
+        self.gaps = Some(gaps);
+        written
+    }
+
+    fn filter(
+        &mut self,
+        parts: &[impl Input],
+        frames: usize,
+        most: usize,
+        output: &mut dyn SplitOutput,
+    ) -> Result<usize, ProcessError> {
+        let samples = frames * self.stream().ratio();
         let dropped = self.skip.min(samples);
         self.kept = dropped..samples.min(dropped.saturating_add(most));
-        let is_filled = self.gaps.as_mut().is_some_and(|gaps| gaps.fill(parts));
         for (p, part) in parts.iter().enumerate() {
             if parts.len() > 1 {
                 output.select(p);
             }
-            let (stream, workers) = (&mut self.streams[p], self.workers);
             let kept = (self.kept != (0..samples)).then(|| self.kept.clone());
-            match &self.gaps {
-                Some(gaps) if is_filled => {
-                    let filled = Interleaved::new(gaps.filled(p), part.channels())?;
-                    run(stream, &filled, kept, output, workers)?
-                }
-                _ => run(stream, part, kept, output, workers)?,
-            };
+            run(&mut self.streams[p], part, kept, output, self.workers)?;
         }
         self.skip -= dropped;
         Ok(self.kept.len())
     }
 
+    /// Output samples of the frames so far that wait for later frames, from which missing samples may have
+    /// to be estimated.
+    pub(super) fn pending(&self) -> usize {
+        let held = self.gaps.as_ref().map_or(0, GapFiller::held);
+        (held * self.stream().ratio()).saturating_sub(self.skip)
+    }
+
     /// Frames without a signal that bring out `count` more samples.
     pub(super) fn flush_frames(&self, count: usize) -> usize {
-        self.skip.saturating_add(count).div_ceil(self.stream().ratio())
+        let held = self.gaps.as_ref().map_or(0, GapFiller::held);
+        self.skip.saturating_add(count).div_ceil(self.stream().ratio()).saturating_add(held)
     }
 
     /// As [`Fusion::step`], with frames without a signal.
@@ -178,6 +204,10 @@ impl<'a> Fusion<'a> {
         most: usize,
         output: &mut dyn SplitOutput,
     ) -> Result<usize, ProcessError> {
+        if let Some(gaps) = &mut self.gaps {
+            let frames = gaps.fill_after_end(frames);
+            return self.filter_filled(frames, most, output);
+        }
         // The offsets of the converters, which are 0 once they are subtracted.
         let silence = self.offsets.repeat(frames);
         let part = Interleaved::new(&silence, self.offsets.len())?;

@@ -1,20 +1,26 @@
-//! Missing samples: their replacement, their position, and the outputs that they affect.
+//! Missing samples: their estimates from the samples around them, and their places.
 //!
-//! A missing sample is marked by NaN; a complex sample is missing if one of its parts is. An output of an
-//! FIR bank is affected if one of its taps falls on a missing sample. Outputs are exact again when the gap
-//! has left the history of the filters. A recursive bank has infinite history, so all later outputs count
-//! as affected.
+//! A missing sample is marked by NaN; a complex sample is missing if one of its parts is. It is replaced by
+//! its linear estimate of least mean-square error from all samples of the frames around it. Estimates of
+//! estimates are estimates: a bank whose taps are the best ones for all samples so gives the best output for
+//! those that remain, with the taps that it has.
 
-use crate::bank::{Bank, FrameLayout, FrameSample, SynthesisFilters};
-use crate::runtime::{Input, Isa};
+use super::cost::{Cost, Costs};
+use crate::bank::{Bank, FrameLayout, FrameSample};
+use crate::runtime::{Input, Isa, Plan};
+use crate::units::Decibels;
+use std::collections::HashMap;
 use std::fmt;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Maximum number of gaps that a report lists; further gaps are only counted, so that memory stays bounded.
 pub const LISTED_GAPS: usize = 65_536;
+/// Patterns of missing samples whose estimates are kept, at most.
+const KEPT_PATTERNS: usize = 4096;
 
 /// A run of missing samples of one converter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Gap {
     /// The channel, from 1.
     pub channel: usize,
@@ -23,17 +29,19 @@ pub struct Gap {
     pub first: u64,
     /// Samples that are missing.
     pub length: u64,
+    /// The predicted signal-to-noise ratio of the worst frame of outputs during the gap.
+    pub snr_db: Decibels,
 }
 
 impl fmt::Display for Gap {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { channel, first, length } = self;
-        write!(f, "gap: channel {channel}, sample {first}, {length} missing")
+        let Self { channel, first, length, snr_db } = self;
+        write!(f, "gap: channel {channel}, sample {first}, {length} missing, SNR {:.1} dB there", snr_db.0)
     }
 }
 
 /// The gaps of a run.
-#[derive(Debug, Clone, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct GapSummary {
     /// Number of gaps that have ended.
     pub count: u64,
@@ -43,106 +51,133 @@ pub struct GapSummary {
     pub list: Vec<Gap>,
 }
 
-/// The replacement of a missing sample. What is replaced are the samples as the converters deliver them, so
-/// a converter without a signal delivers its offset.
+/// Estimates missing samples from those around them.
+pub trait GapEstimator: fmt::Debug + Send + Sync {
+    /// Frames on either side of a frame from whose samples its missing ones are estimated.
+    fn reach(&self) -> usize;
+
+    /// The mean-square error of the outputs where no sample is missing, over the power of the target.
+    fn error(&self) -> f64;
+
+    /// The estimates of the missing samples in the middle one of `2 reach + 1` frames. `is_there` says of
+    /// each sample of these frames, in their order, whether it is known.
+    fn estimate(&self, is_there: &[bool]) -> GapEstimate;
+}
+
+/// How the missing samples of a frame follow from those around them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GapEstimate {
+    /// For each missing sample the weights of all samples of the frames; those of unknown ones are 0.
+    pub weights: Vec<Vec<f64>>,
+    /// Standard deviation of the error of each, over that of the target.
+    pub deviations: Vec<f64>,
+    /// What is missing adds this mean-square error to the worst output of the frame, over the power of the
+    /// target.
+    pub added_error: f64,
+}
+
+/// What is known of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum GapPolicy {
-    /// Zero after the offset is subtracted: the channel's offset.
-    Zero,
-    /// The converter's last good sample (as [`GapPolicy::Zero`] before the first).
-    Hold,
+enum Known {
+    There,
+    Missing,
+    /// Before the beginning of the signal, or after its end.
+    Outside,
 }
 
-/// The state of a converter.
-#[derive(Debug, Clone, Copy)]
-struct Converter {
-    /// What it delivers without a signal.
-    offset: f64,
-    /// The last good sample: a real one, or both parts of a complex one.
-    last: [f64; 2],
-    /// The gap that has not ended.
-    open: Option<Gap>,
-}
-
-/// Fills gaps frame by frame.
+/// Replaces missing samples frame by frame.
 ///
-/// Output p of frame k is y\[kM + p\] = sum_i sum_j f_i\[p + jM\] x_i\[k - j\], so a missing x_i\[k\]
-/// affects y\[kM + n\] if and only if f_i\[n\] is not zero. It marks these outputs at once, which takes less
-/// time than filtering it.
+/// Frames come out `reach` frames later than they go in, as the estimates look so far ahead.
 #[derive(Debug, Clone)]
 pub(super) struct GapFiller {
-    policy: GapPolicy,
-    ratio: usize,
-    /// The runs of nonzero taps of each sample of a frame; `None` for a recursion.
-    taps: Option<Vec<Vec<Range<usize>>>>,
+    estimator: Arc<dyn GapEstimator>,
     layout: FrameLayout,
     /// The samples of a frame.
     samples: Vec<FrameSample>,
-    converters: Vec<Converter>,
+    /// What each delivers without a signal.
+    offsets: Vec<f64>,
+    /// The gap of each converter that has not ended.
+    open: Vec<Option<Gap>>,
     summary: GapSummary,
+    /// Number of the first frame that has not come out.
     frame: u64,
-    /// The filled frames of each part of the samples.
+    /// Frames that came out last; they begin `reach` frames after the beginning of `numbers`.
+    out: usize,
+    /// The frames around, for each part of the samples, and what is known of them.
     numbers: Vec<Vec<f64>>,
-    /// The marks of the outputs of the last frames, and the known marks of later outputs.
-    marks: Vec<u8>,
-    /// How many of the marks belong to the last frames.
-    used: usize,
-    /// Samples by which the outputs are later than those of the definition.
-    extra_latency: usize,
+    known: Vec<Known>,
+    estimates: HashMap<Vec<bool>, Arc<GapEstimate>>,
+    costs: Costs,
 }
 
 impl GapFiller {
-    /// A filler for the channels and taps of a bank, and samples of so many parts. The outputs are
-    /// `extra_latency` samples later than those of the definition.
-    pub(super) fn new(bank: &Bank, policy: GapPolicy, parts: usize, extra_latency: usize) -> Self {
-        let converter = |&offset: &f64| Converter { offset, last: [offset; 2], open: None };
+    /// A filler for samples of so many parts before `plan`, which must be the plan of `bank`.
+    pub(super) fn new(bank: &Bank, plan: &Plan, parts: usize, estimator: Arc<dyn GapEstimator>) -> Self {
         let layout = bank.layout();
+        let samples: Vec<FrameSample> = layout.iter().collect();
+        let offsets = layout.each(&bank.offsets);
+        let before = offsets.repeat(estimator.reach());
         Self {
-            policy,
-            ratio: bank.ratio,
-            taps: nonzero_taps(bank),
-            samples: layout.iter().collect(),
+            costs: Costs::new(plan, &offsets, estimator.error()),
             layout,
-            converters: bank.offsets.iter().map(converter).collect(),
+            open: vec![None; bank.channel_count()],
             summary: GapSummary::default(),
             frame: 0,
-            numbers: vec![Vec::new(); parts],
-            marks: Vec::new(),
-            used: 0,
-            extra_latency,
+            out: 0,
+            known: vec![Known::Outside; before.len()],
+            numbers: vec![before; parts],
+            estimates: HashMap::new(),
+            estimator,
+            samples,
+            offsets,
         }
     }
 
-    /// Takes the next frames of all `parts` of the samples. True if [`GapFiller::filled`] has to take their
-    /// place; else no sample is missing.
-    pub(super) fn fill(&mut self, parts: &[impl Input]) -> bool {
+    /// Takes the next frames of all `parts` of the samples, and returns how many come out.
+    pub(super) fn fill(&mut self, parts: &[impl Input]) -> usize {
         let frames = parts.first().map_or(0, Input::frames);
-        self.begin_marks(frames);
-        if self.open().next().is_none() && parts.iter().all(|part| part.is_finite(0..frames)) {
-            self.pass(parts, frames);
-            return false;
-        }
-        let n = self.samples.len();
+        self.forget();
+        let begin = self.known.len();
+        let end = begin + frames * self.samples.len();
         for (numbers, part) in self.numbers.iter_mut().zip(parts) {
-            numbers.resize(frames * n, 0.0);
-            part.load_f64(Isa::detect(), 0, numbers);
+            numbers.resize(end, 0.0);
+            part.load_f64(Isa::detect(), 0, &mut numbers[begin..]);
         }
-        for frame in 0..frames {
-            (0..n).for_each(|i| self.fill_sample(frame, i));
+        for index in begin..end {
+            let is_there = self.numbers.iter().all(|part| part[index].is_finite());
+            self.known.push(if is_there { Known::There } else { Known::Missing });
+            if !is_there {
+                self.set(index, 0.0);
+            }
         }
-        self.frame += frames as u64;
-        true
+        self.come_out()
     }
 
-    /// The frames of one part, filled.
+    /// As [`GapFiller::fill`] with frames after the end of the signal.
+    pub(super) fn fill_after_end(&mut self, frames: usize) -> usize {
+        self.forget();
+        let silence = self.offsets.repeat(frames);
+        self.known.resize(self.known.len() + silence.len(), Known::Outside);
+        self.numbers.iter_mut().for_each(|numbers| numbers.extend_from_slice(&silence));
+        self.come_out()
+    }
+
+    /// The frames of one part that came out last.
     pub(super) fn filled(&self, part: usize) -> &[f64] {
-        &self.numbers[part]
+        let n = self.samples.len();
+        let first = self.estimator.reach() * n;
+        &self.numbers[part][first..first + self.out * n]
     }
 
-    /// For some of the outputs of the last frames: 1 if a missing sample affects it, else 0.
+    /// Frames that went in and have not come out.
+    pub(super) fn held(&self) -> usize {
+        self.known.len() / self.samples.len() - self.estimator.reach() - self.out
+    }
+
+    /// For some of the outputs of the frames that came out last: 0 if no missing sample affects it, else its
+    /// predicted signal-to-noise ratio in decibels, at least 1 and at most 255.
     pub(super) fn marks(&self, outputs: Range<usize>) -> &[u8] {
-        &self.marks[outputs]
+        self.costs.marks(outputs)
     }
 
     /// The gaps that have ended.
@@ -152,73 +187,103 @@ impl GapFiller {
 
     /// The gaps that have not ended, with their length so far.
     pub(super) fn open(&self) -> impl Iterator<Item = Gap> {
-        self.converters.iter().filter_map(|converter| converter.open)
+        self.open.iter().copied().flatten()
     }
 
     /// All gaps, once the input is over: those that are open end there.
     pub(super) fn finish(mut self) -> GapSummary {
-        (0..self.converters.len()).for_each(|converter| self.end_gap(converter));
+        let held = self.held();
+        self.fill_after_end(held);
+        (0..self.open.len()).for_each(|converter| self.end_gap(converter));
         self.summary
     }
 
-    /// Room for the marks of so many frames. After a missing sample all later outputs of a recursion are
-    /// affected.
-    fn begin_marks(&mut self, frames: usize) {
-        self.marks.drain(..self.used);
-        self.used = frames * self.ratio;
-        let later = u8::from(self.taps.is_none() && self.summary.missing > 0);
-        self.marks.resize(self.marks.len().max(self.used + self.extra_latency), later);
+    /// Drops the frames that no later estimate needs.
+    fn forget(&mut self) {
+        let old = self.out * self.samples.len();
+        self.known.drain(..old);
+        self.numbers.iter_mut().for_each(|numbers| drop(numbers.drain(..old)));
+        self.frame += self.out as u64;
+        self.out = 0;
     }
 
-    /// Frames without a gap, while none is open: only the last samples matter.
-    fn pass(&mut self, parts: &[impl Input], frames: usize) {
-        self.frame += frames as u64;
-        if frames == 0 {
-            return;
+    /// Estimates what is missing in the frames that have all frames around them.
+    fn come_out(&mut self) -> usize {
+        let n = self.samples.len();
+        let reach = self.estimator.reach();
+        self.out = (self.known.len() / n).saturating_sub(2 * reach);
+        self.costs.begin(self.out);
+        for frame in 0..self.out {
+            let own = (frame + reach) * n..(frame + reach + 1) * n;
+            let is_missing = self.known[own.clone()].contains(&Known::Missing);
+            let snr = is_missing.then(|| self.restore(frame));
+            for (i, index) in own.enumerate() {
+                match snr.filter(|_| self.known[index] == Known::Missing) {
+                    Some(snr) => self.lengthen_gap(frame, i, snr),
+                    None => self.end_gap(self.samples[i].converter),
+                }
+            }
         }
-        for (p, (numbers, part)) in self.numbers.iter_mut().zip(parts).enumerate() {
-            numbers.resize(self.samples.len(), 0.0);
-            part.load_f64(Isa::detect(), frames - 1, numbers);
-            self.samples.iter().zip(numbers).for_each(|(sample, last)| {
-                self.converters[sample.converter].last[p] = *last;
-            });
-        }
+        self.costs.complete();
+        self.out
     }
 
-    /// Sample i of frame `frame` of the block.
-    fn fill_sample(&mut self, frame: usize, i: usize) {
-        let index = frame * self.samples.len() + i;
+    /// Replaces the missing samples of a frame that comes out; returns the predicted ratio of its outputs.
+    fn restore(&mut self, frame: usize) -> Decibels {
+        let n = self.samples.len();
+        let reach = self.estimator.reach();
+        let around = frame * n..(frame + 2 * reach + 1) * n;
+        let estimate = self.estimate(around.clone());
+        let first = around.start + reach * n;
+        let missing = (0..n).filter(|i| self.known[first + i] == Known::Missing).collect::<Vec<_>>();
+        for (k, &i) in missing.iter().enumerate() {
+            for part in 0..self.numbers.len() {
+                let value = self.weighted(part, around.clone(), &estimate.weights[k]);
+                self.numbers[part][first + i] = self.offsets[i] + value;
+            }
+            let cost = Cost { deviation: estimate.deviations[k], most: estimate.added_error };
+            self.costs.add(frame, i, cost);
+        }
+        self.costs.snr(estimate.added_error)
+    }
+
+    fn estimate(&mut self, around: Range<usize>) -> Arc<GapEstimate> {
+        let is_there: Vec<bool> = self.known[around].iter().map(|known| *known == Known::There).collect();
+        if let Some(known) = self.estimates.get(&is_there) {
+            return Arc::clone(known);
+        }
+        if self.estimates.len() == KEPT_PATTERNS {
+            self.estimates.clear();
+        }
+        let new = Arc::new(self.estimator.estimate(&is_there));
+        self.estimates.insert(is_there, Arc::clone(&new));
+        new
+    }
+
+    /// The weighted sum of the samples of one part around a frame, without their offsets.
+    fn weighted(&self, part: usize, around: Range<usize>, weights: &[f64]) -> f64 {
+        let samples = self.numbers[part][around].iter().zip(self.offsets.iter().cycle());
+        samples.zip(weights).map(|((x, offset), weight)| weight * (x - offset)).sum()
+    }
+
+    fn set(&mut self, index: usize, value: f64) {
+        self.numbers.iter_mut().for_each(|numbers| numbers[index] = value);
+    }
+
+    /// Counts sample i of a frame that comes out.
+    fn lengthen_gap(&mut self, frame: usize, i: usize, snr: Decibels) {
         let FrameSample { converter, number } = self.samples[i];
-        if self.numbers.iter().all(|part| part[index].is_finite()) {
-            let last = self.converters[converter].last.iter_mut();
-            last.zip(&self.numbers).for_each(|(last, part)| *last = part[index]);
-            return self.end_gap(converter);
-        }
-        let Converter { offset, last, .. } = self.converters[converter];
-        for (part, last) in self.numbers.iter_mut().zip(last) {
-            part[index] = if self.policy == GapPolicy::Hold { last } else { offset };
-        }
-        self.mark(frame, i);
         let per_frame = self.layout.samples()[converter] as u64;
         let first = (self.frame + frame as u64) * per_frame + number as u64;
-        let new = Gap { channel: converter + 1, first, length: 0 };
-        self.converters[converter].open.get_or_insert(new).length += 1;
+        let new = Gap { channel: converter + 1, first, length: 0, snr_db: snr };
+        let gap = self.open[converter].get_or_insert(new);
+        gap.length += 1;
+        gap.snr_db = Decibels(gap.snr_db.0.min(snr.0));
         self.summary.missing += 1;
     }
 
-    /// Marks the outputs that sample i of frame `frame` of the block affects.
-    fn mark(&mut self, frame: usize, i: usize) {
-        let first = frame * self.ratio + self.extra_latency;
-        let Some(taps) = &self.taps else { return self.marks[first..].fill(1) };
-        for run in &taps[i] {
-            let end = first + run.end;
-            self.marks.resize(self.marks.len().max(end), 0);
-            self.marks[first + run.start..end].fill(1);
-        }
-    }
-
     fn end_gap(&mut self, converter: usize) {
-        let Some(gap) = self.converters[converter].open.take() else { return };
+        let Some(gap) = self.open[converter].take() else { return };
         self.summary.count += 1;
         if self.summary.list.len() < LISTED_GAPS {
             self.summary.list.push(gap);
@@ -226,30 +291,5 @@ impl GapFiller {
     }
 }
 
-/// The runs of nonzero taps of each sample of a frame; `None` for a recursion.
-fn nonzero_taps(bank: &Bank) -> Option<Vec<Vec<Range<usize>>>> {
-    match &bank.filters {
-        SynthesisFilters::Fir(taps) => Some(taps.iter().map(|f| nonzero_runs(f.iter().copied())).collect()),
-        SynthesisFilters::StateSpace(block) if block.a.is_empty() => {
-            let outputs = || block.d.iter().take(bank.ratio);
-            let taps = |i: usize| outputs().map(move |row| row.get(i).copied().unwrap_or(0.0));
-            Some((0..bank.frame_samples()).map(|i| nonzero_runs(taps(i))).collect())
-        }
-        SynthesisFilters::StateSpace(_) => None,
-    }
-}
-
-/// The ranges of numbers that are not zero.
-fn nonzero_runs(numbers: impl Iterator<Item = f64>) -> Vec<Range<usize>> {
-    let mut runs: Vec<Range<usize>> = Vec::new();
-    for (n, _) in numbers.enumerate().filter(|(_, number)| *number != 0.0) {
-        match runs.last_mut() {
-            Some(run) if run.end == n => run.end += 1,
-            _ => runs.push(n..n + 1),
-        }
-    }
-    runs
-}
-
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

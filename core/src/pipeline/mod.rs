@@ -1,14 +1,15 @@
 //! Runs a bank on recordings, streams or signals in memory.
 //!
 //! ```text
-//! Input -> GapFiller -> runtime::Stream -> latency dropped -> runtime::Output (samples and mask)
+//! Input -> missing samples estimated -> runtime::Stream -> latency dropped -> runtime::Output
 //! ```
 //!
-//! One loop (`fusion`) fills missing samples, runs the bank, drops the latency, and marks the samples that
-//! missing inputs affect. A [`Pipeline`] runs it on frames as they arrive and hands over encoded samples,
-//! for example to [`FileOutputs`]. [`fuse`] runs it on a signal in memory. Complex samples are two streams
-//! over the same frames; a sample with one part missing is missing. The result is an [`Outcome`] with counts
-//! and [`Warning`]s; nothing is printed.
+//! One loop (`fusion`) estimates missing samples, runs the bank, drops the latency, and marks the samples
+//! that missing inputs affect. A [`GapEstimator`] knows how samples hang together, so this room computes no
+//! covariances. A [`Pipeline`] runs the loop on frames as they arrive and hands over encoded samples, for
+//! example to [`FileOutputs`]. [`fuse`] runs it on a signal in memory. Complex samples are two streams over
+//! the same frames; a sample with one part missing is missing. The result is an [`Outcome`] with counts and
+//! [`Warning`]s; nothing is printed.
 //!
 //! ```
 //! use hybank_core::bank::{Bank, SynthesisFilters};
@@ -29,6 +30,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod cost;
 mod fusion;
 mod gaps;
 pub mod matching;
@@ -39,7 +41,7 @@ mod state;
 mod streaming;
 
 pub use fusion::{DroppedLatency, Settings};
-pub use gaps::{Gap, GapPolicy, GapSummary, LISTED_GAPS};
+pub use gaps::{Gap, GapEstimate, GapEstimator, GapSummary, LISTED_GAPS};
 pub use offline::{fuse, fused};
 pub use outcome::{Outcome, PipelineError, Warning};
 pub use outputs::FileOutputs;

@@ -7,7 +7,8 @@ use crate::runtime::{
     Frames, Input, Options, Plan, Planar, Precision, ProcessError, SplitOutput, ThreadPool,
 };
 
-/// Samples of a step whose frames are copied: those in which gaps are filled, and those without a signal.
+/// Samples of a step whose frames are copied: those in which missing samples are estimated, and those
+/// without a signal.
 const COPIED_SAMPLES: usize = 1 << 17;
 
 /// Multiply-adds of a step on one thread: from 2 ms with AVX-512 to 100 ms with double sums on a slow
@@ -46,8 +47,9 @@ pub fn fuse(
         output.select(0);
     }
     check(plan, parts, output.capacity(), wanted)?;
+    let most = step(bank, plan, &settings);
+    let has_mask = settings.gaps.is_some();
     let mut fusion = Fusion::new(bank, plan, parts.len(), settings);
-    let most = step(bank, plan, settings);
     let mut mask = Vec::new();
     let (mut first, mut written) = (0, 0);
     while first < frames {
@@ -67,7 +69,7 @@ pub fn fuse(
         mask.extend_from_slice(fusion.marks().unwrap_or_default());
     }
     let outcome = fusion.finish(wanted as u64, 0);
-    Ok(Outcome { mask: settings.gaps.map(|_| mask), ..outcome })
+    Ok(Outcome { mask: has_mask.then_some(mask), ..outcome })
 }
 
 /// What `write` does with the room after the first `samples` samples.
@@ -108,11 +110,11 @@ fn check(plan: &Plan, parts: &[&dyn Input], capacity: usize, wanted: usize) -> R
 }
 
 /// Frames of a step, a multiple of the plan's alignment unless gaps are filled.
-fn step(bank: &Bank, plan: &Plan, settings: Settings<'_>) -> usize {
+fn step(bank: &Bank, plan: &Plan, settings: &Settings<'_>) -> usize {
     let threads = settings.workers.map_or(1, ThreadPool::threads);
     let each = multiply_adds_per_frame(bank, plan) + plan.ratio() * MULTIPLY_ADDS_PER_STORE;
     let most = (threads * STEP_MULTIPLY_ADDS / each).max(1).next_multiple_of(plan.alignment());
-    match settings.gaps {
+    match &settings.gaps {
         Some(_) => copied_frames(plan).min(most),
         None => most,
     }

@@ -23,10 +23,10 @@ pub struct Outcome {
     pub replaced: u64,
     /// Times that a recursion's state was not finite and was set to zero.
     pub state_resets: u64,
-    /// Missing samples, if they were to be filled.
+    /// Missing samples, if they were to be estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gaps: Option<GapSummary>,
-    /// One byte per output sample, 1 if a missing input affects it, if gaps were to be filled by
+    /// The mask of [`Block`](super::Block), if missing samples were to be estimated by
     /// [`fuse`](super::fuse). A [`Pipeline`](super::Pipeline) hands the mask over with its samples.
     #[serde(skip)]
     pub mask: Option<Vec<u8>>,

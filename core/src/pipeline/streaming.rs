@@ -16,14 +16,16 @@ const PARALLEL_STEPS: usize = 8;
 pub struct Block<'a> {
     /// Encoded samples.
     pub samples: &'a [u8],
-    /// One byte per sample, 1 if a missing input affects it, else 0; `None` if gaps are not filled.
+    /// One byte per sample: 0 if no missing input affects it, else its predicted signal-to-noise ratio in
+    /// decibels, from 1 to 255; `None` if missing samples are not estimated.
     pub mask: Option<&'a [u8]>,
 }
 
 /// Takes the outputs of a [`Pipeline`].
 type Write<'w> = &'w mut dyn FnMut(Block<'_>) -> Result<(), IoError>;
 
-/// Runs a bank on frames as they arrive: fills gaps, filters, drops the latency, encodes and counts.
+/// Runs a bank on frames as they arrive: estimates missing samples, filters, drops the latency, encodes and
+/// counts.
 #[derive(Debug)]
 pub struct Pipeline<'a> {
     pub(super) fusion: Fusion<'a>,
@@ -46,8 +48,8 @@ impl<'a> Pipeline<'a> {
         format: PcmFormat,
         is_complex: bool,
     ) -> Self {
-        let fusion = Fusion::new(bank, plan, 1 + usize::from(is_complex), settings);
         let steps = if settings.workers.is_some() { PARALLEL_STEPS } else { 1 };
+        let fusion = Fusion::new(bank, plan, 1 + usize::from(is_complex), settings);
         let step = (steps * STEP_BYTES / plan.ratio() / format.bytes()).max(1);
         Self { fusion, format, step, samples: 0, clipped: 0, buffer: Vec::new() }
     }
@@ -65,6 +67,12 @@ impl<'a> Pipeline<'a> {
     /// Output samples so far.
     pub fn samples(&self) -> u64 {
         self.samples
+    }
+
+    /// Output samples of the frames so far that wait for later frames, from which missing samples may have
+    /// to be estimated; a flush brings them out.
+    pub fn pending(&self) -> u64 {
+        self.fusion.pending() as u64
     }
 
     /// Numbers of the output that saturated so far.

@@ -43,7 +43,7 @@ pub use limits::{check_noise, check_offset, within};
 pub use one_or_each::OneOrEach;
 pub use passband::Passband;
 pub(crate) use reading::refusal;
-pub use signal::{Band, SignalSpec, SignalSpectrum, USUAL_RMS};
+pub use signal::{Band, ROUNDING_16_BITS, SignalSpec, SignalSpectrum, USUAL_RMS};
 pub use sizes::{MAX_ERROR_STATES, MAX_FRONT_END_STATES};
 pub(crate) use table::Table;
 pub(crate) use tables::SpecTable;

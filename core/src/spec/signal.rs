@@ -11,6 +11,10 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 /// leaves room for peaks.
 pub const USUAL_RMS: f64 = 0.25;
 
+/// Variance of the rounding to 16 bits of a full scale from -1 to 1, step^2 / 12: the noise that is assumed
+/// where the spec states none and there has to be some.
+pub const ROUNDING_16_BITS: f64 = 1.0 / (12.0 * (1u64 << 30) as f64);
+
 /// Least and largest floor in decibels below the band.
 const FLOORS: std::ops::RangeInclusive<f64> = 3.0..=200.0;
 

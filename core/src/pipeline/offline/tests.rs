@@ -1,11 +1,13 @@
 use super::*;
 use crate::bank::SynthesisFilters;
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
-use crate::pipeline::{Block, DroppedLatency, GapPolicy, Pipeline};
+use crate::pipeline::gaps::tests::Mean;
+use crate::pipeline::{Block, DroppedLatency, GapEstimator, Pipeline};
 use crate::random::Random;
 use crate::runtime::{Algorithm, Interleaved, Options, PcmOutput, Planar, Stream, Zeros};
 use crate::units::Seconds;
 use std::cell::Cell;
+use std::sync::Arc;
 
 const NEVER: &dyn Fn() -> bool = &|| false;
 
@@ -54,6 +56,11 @@ fn command(
     (written, pipeline.finish())
 }
 
+/// Estimates of missing samples of two converters.
+fn mean() -> Arc<dyn GapEstimator> {
+    Arc::new(Mean { reach: 5, samples: 2 })
+}
+
 #[test]
 fn a_whole_signal_has_the_bits_of_the_command() {
     let pool = ThreadPool::new(2).unwrap();
@@ -74,13 +81,13 @@ fn a_whole_signal_has_the_bits_of_the_command() {
             (true, false, PcmFormat::S16Le),
         ] {
             let both = channels(frames, gap);
-            let gaps = gap.then_some(GapPolicy::Hold);
+            let gaps = gap.then(mean);
             let dropped = if keep_latency { DroppedLatency::Added } else { DroppedLatency::All };
             let settings = Settings { dropped, gaps, ..Settings::default() };
             let stored = both.each_ref().map(|x| x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>());
             let layout = SampleLayout::packed(PcmFormat::F32Le);
             let recordings = stored.each_ref().map(|bytes| PcmFrames { layout, channels: 1, bytes });
-            let (want, outcome) = command(&bank, &plan, &recordings, settings, (format, false));
+            let (want, outcome) = command(&bank, &plan, &recordings, settings.clone(), (format, false));
             let planes = both.each_ref().map(Vec::as_slice);
             let mut bytes = vec![0; frames * ratio * format.bytes()];
             let mut output = PcmOutput::packed(format, &mut bytes);
@@ -108,8 +115,8 @@ fn complex_samples_with_gaps_have_the_bits_and_gaps_of_the_command() {
     [4 * 40 + 1, 4 * 90 + 2, 4 * 91 + 3].into_iter().for_each(|number| samples[number] = f32::NAN);
     let bytes: Vec<u8> = samples.iter().flat_map(|x| x.to_le_bytes()).collect();
     let recording = PcmFrames { layout: SampleLayout::packed(PcmFormat::F32Le), channels: 4, bytes: &bytes };
-    let settings = Settings { gaps: Some(GapPolicy::Hold), ..Settings::default() };
-    let (want, outcome) = command(&bank, &plan, &[recording], settings, (PcmFormat::F32Le, true));
+    let settings = Settings { gaps: Some(mean()), ..Settings::default() };
+    let (want, outcome) = command(&bank, &plan, &[recording], settings.clone(), (PcmFormat::F32Le, true));
     let (real, imaginary) = ([recording.part(0)], [recording.part(1)]);
     let parts: [&dyn Input; 2] = [&real.as_slice(), &imaginary.as_slice()];
     let mut bytes = vec![0; want.samples.len()];
@@ -134,7 +141,7 @@ fn an_output_that_is_too_short_and_channels_that_do_not_match_are_refused() {
         Err(PipelineError::Process(ProcessError::OutputTooShort { given: 7, wanted: 8 }))
     ));
     let mono = Interleaved::new(&[0.0f32; 8], 1).unwrap();
-    for gaps in [None, Some(GapPolicy::Zero)] {
+    for gaps in [None, Some(mean())] {
         let settings = Settings { gaps, ..Settings::default() };
         let refused = fuse(&bank, &plan, &[&mono], &mut [0.0f32; 16].as_mut_slice(), settings, NEVER);
         assert!(matches!(
@@ -166,7 +173,7 @@ fn segments_change_no_bit_and_a_fusion_ends_between_them() {
         assert!(segments[..segments.len() - delay] == at_once[delay..], "{algorithm:?}");
         let questions = asked.get();
         assert!(
-            questions >= both[0].len().div_ceil(step(&bank, &plan, Settings::default())),
+            questions >= both[0].len().div_ceil(step(&bank, &plan, &Settings::default())),
             "{algorithm:?}"
         );
         assert!(
