@@ -3,7 +3,8 @@
     python3 examples/merge/scenes.py [NAME ..]      needs numpy, scipy, soundfile, and hybank on the path (or HYBANK)
 
 Every scene has a signal whose spectrum ends, recorders with rates, clocks, polarities, noise and 16 bits of their
-own, all seeded. What a recorder samples, and the truth, are values of the same band-limited function.
+own, all seeded; sensors and loggers write tables with time stamps. What a recorder samples, and the truth, are
+values of the same band-limited function.
 """
 import json, os, subprocess, sys, tempfile
 import numpy as np
@@ -89,9 +90,73 @@ SCENES = {
         "music", 20e3,
         [Recorder(24_000, 0.5), Recorder(24_000, 0.7, 12, 0.9), Recorder(24_000, 0.1, -31, -1.1)], 72_000,
     ),
+    "noise, three": (
+        "noise", 20e3,
+        [Recorder(24_000, 0.5), Recorder(24_000, 0.7, 12, 0.9), Recorder(24_000, 0.1, -31, -1.1)], 72_000,
+    ),
     "drift turns round": ("music", 18e3, [Recorder(24_000, 0.5), Recorder(24_000, 0.9, 0, 0.7, bend=40)], 48_000),
     "quiet recorder": ("speech", 10e3, [Recorder(24_000, 0.5), Recorder(24_000, 0.9, 25, 0.05)], 24_000),
 }
+
+
+class Sensor:
+    """Values with time stamps, off its even clock by up to `jitter` seconds, which the stamps know."""
+
+    def __init__(self, rate, ppm=0.0, noise=1e-4, jitter=0.0):
+        self.rate, self.ppm, self.noise, self.jitter = rate, ppm, noise, jitter
+
+    def write(self, path, tones, seconds, rng):
+        t = np.arange(int(seconds * self.rate)) / self.rate / (1 + 1e-6 * self.ppm) + 0.01
+        t += self.jitter * rng.uniform(-1, 1, len(t))
+        y = tones(t) + self.noise * rng.standard_normal(len(t))
+        np.savetxt(path, np.column_stack([t, y]), "%.9f", ",", header="time,x", comments="")
+        return t, y
+
+
+STAMPED = {
+    # name: top of the band, sensors, rate of the result, seconds
+    "three sensors": (90, [Sensor(100, 25, 1e-3), Sensor(125, -40, 2e-3), Sensor(80, 10, 5e-4)], 400, 120),
+    "logger 100 us": (200, [Sensor(500, noise=1e-3, jitter=100e-6)], 500, 40),
+    "logger 600 us": (200, [Sensor(500, noise=1e-3, jitter=600e-6)], 500, 40),
+}
+
+
+def run_stamped(name, folder):
+    top, sensors, rate, seconds = STAMPED[name]
+    rng = np.random.default_rng(5)
+    lines = top * rng.random(200), 2 * np.pi * rng.random(200)
+
+    def tones(t):
+        """Of power 1 and of a spectrum that is flat over the band."""
+        return 0.1 * sum(np.cos(2 * np.pi * f * t + phase) for f, phase in zip(*lines))
+
+    files = [f"{folder}/{number}.csv" for number in range(len(sensors))]
+    written = [sensor.write(file, tones, seconds, rng) for sensor, file in zip(sensors, files)]
+    output = f"{folder}/merged.csv"
+    command = [HYBANK, "merge", *files, "-o", output, "--rate", f"{rate}Hz", "--json", "--force", *sys.argv_extra]
+    told = subprocess.run(command, capture_output=True, text=True)
+    if told.returncode:
+        return f"{name:18} {told.stderr.strip()}"
+    t, merged = np.loadtxt(output, delimiter=",", skiprows=1).T
+    truth, inner = tones(t), slice(len(t) // 20, -len(t) // 20)
+
+    def snr(y):
+        return 10 * np.log10(np.mean(truth[inner] ** 2) / np.mean((y[inner] - truth[inner]) ** 2))
+
+    alone = [CubicSpline(*one)(t) for one in written]
+    times, samples = map(np.concatenate, zip(*written))
+    order = np.argsort(times)
+    order = order[np.concatenate([[True], np.diff(times[order]) > 1e-4])]
+    spline = CubicSpline(times[order], samples[order])(t)
+    return row(name, snr(merged), told, snr(spline), max(map(snr, alone)), snr(np.mean(alone, axis=0)))
+
+
+def row(name, merged, told, spline, best, mean):
+    predicted = json.loads(told.stdout)["predicted_snr_db"]
+    return (
+        f"{name:18} merged {merged:5.1f} (predicted {predicted:5.1f})   spline {spline:5.1f}   "
+        f"best recorder {best:5.1f}   mean {mean:5.1f}"
+    )
 
 
 def run(name, folder, seconds=float(os.environ.get("SECONDS_OF_SCENE", 16))):
@@ -131,16 +196,13 @@ def run(name, folder, seconds=float(os.environ.get("SECONDS_OF_SCENE", 16))):
     keep = np.concatenate([[True], np.diff(together[order]) > 1e-9])
     spline = CubicSpline(together[order][keep], np.concatenate(samples)[order][keep])(t)
     alone = [even(number) for number in range(len(recorders))]
-    return (
-        f"{name:18} merged {snr(merged):5.1f} (predicted {report['predicted_snr_db']:5.1f})   spline {snr(spline):5.1f}   "
-        f"best recorder {max(map(snr, alone)):5.1f}   mean {snr(np.mean(alone, axis=0)):5.1f}"
-    )
+    return row(name, snr(merged), told, snr(spline), max(map(snr, alone)), snr(np.mean(alone, axis=0)))
 
 
 if __name__ == "__main__":
     sys.argv_extra = [a for a in sys.argv[1:] if a.startswith("--")]
-    names = [a for a in sys.argv[1:] if not a.startswith("--")] or list(SCENES)
+    names = [a for a in sys.argv[1:] if not a.startswith("--")] or [*SCENES, *STAMPED]
     print("SNR in dB; spline: cubic, through all samples at their true instants; the others by the true clocks")
     with tempfile.TemporaryDirectory() as folder:
         for name in names:
-            print(run(name, folder), flush=True)
+            print((run_stamped if name in STAMPED else run)(name, folder), flush=True)
