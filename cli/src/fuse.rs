@@ -5,9 +5,10 @@ use super::before_after::{self, BeforeAfterArgs};
 use super::bit_true::BitTrueArgs;
 use super::capture_args::CaptureArgs;
 use super::observer::RunObserver;
-use super::output::bits;
+use super::output::{bits, check_files};
 use super::print::{Failure, is_dash, print, print_report, say_understood};
 use super::run::{Finished, Job, RunArgs, RunReport};
+use super::tracked::{self, TrackArgs};
 use hybank::bank::Bank;
 use hybank::io::{Container, MultiReader, OnStall, PcmFormat};
 use hybank::messages::{Quoted, counted};
@@ -53,6 +54,8 @@ pub(super) struct Args {
     reading: CaptureArgs,
     #[command(flatten)]
     bit_true: BitTrueArgs,
+    #[command(flatten)]
+    track: TrackArgs,
     #[command(flatten)]
     before_after: BeforeAfterArgs,
     #[command(flatten)]
@@ -119,6 +122,9 @@ impl Args {
     fn check(&self) -> Result<(), Failure> {
         self.reading.check(self.run.interleaved.is_given())?;
         self.before_after.check(&self.inputs, &self.output, self.run.force)?;
+        if let Some(table) = self.track.file() {
+            check_files(&self.output, Container::Wav, &[], &[table])?;
+        }
         let prints = self.before_after.is_wanted();
         self.run.check(&self.bank, &self.inputs, &self.output, Container::Wav, prints)
     }
@@ -144,6 +150,9 @@ impl Args {
         let mut reader = self.start_reader(job, &mut |stall| observer.stalled(stall))?;
         if self.bit_true.is_wanted() {
             return self.bit_true.fuse(job, &mut reader, observer, || self.measured(job));
+        }
+        if let Some(table) = self.track.file() {
+            return tracked::fuse(job, table, reader);
         }
         let rate = job.output_rate(&reader)?;
         let progress = progress_bar(reader.promised_frames());

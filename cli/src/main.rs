@@ -36,6 +36,7 @@ mod run;
 mod simulate;
 mod stream;
 mod texts;
+mod tracked;
 mod verify;
 mod virtual_converters;
 mod virtual_signal;

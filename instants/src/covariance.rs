@@ -10,6 +10,8 @@ const POINTS_PER_PERIOD: f64 = 48.0;
 const ORDER: usize = 12;
 /// Steps after which a phasor is computed again, so that products do not collect rounding errors.
 const RENEWAL: usize = 64;
+/// Terms that are summed side by side.
+const LANES: usize = 8;
 
 /// `c(t) = sum_q p_q Re(z_q e^{2 pi j f_q t})` for |t| up to a limit, tabulated.
 #[derive(Debug, Clone)]
@@ -36,20 +38,19 @@ impl Covariance {
         let highest = terms.iter().map(|term| term.frequency).fold(0.0, f64::max);
         let density = POINTS_PER_PERIOD * highest;
         // Half of an interpolation lies beyond either end.
-        let beyond = ORDER / 2 + 1;
-        let count = 2 * ((longest * density).ceil() as usize + beyond) + 1;
-        let first = -((count / 2) as f64) / density;
-        let mut values = vec![0.0; count];
-        for term in terms {
-            let turn = Complex::from_polar(1.0, TAU * term.frequency / density);
-            for (number, chunk) in values.chunks_mut(RENEWAL).enumerate() {
-                let start = first + (number * RENEWAL) as f64 / density;
-                let mut phasor = term.amplitude * Complex::from_polar(1.0, TAU * term.frequency * start);
-                for value in chunk {
-                    *value += phasor.re;
-                    phasor *= turn;
-                }
+        let half = (longest * density).ceil() as usize + ORDER / 2 + 1;
+        let first = -(half as f64) / density;
+        let is_even = terms.iter().all(|term| term.amplitude.im == 0.0);
+        let begin = if is_even { half } else { 0 };
+        let mut values = vec![0.0; 2 * half + 1];
+        for group in terms.chunks(LANES) {
+            for (number, chunk) in values[begin..].chunks_mut(RENEWAL).enumerate() {
+                let start = first + (begin + number * RENEWAL) as f64 / density;
+                Phasors::new(group, start, 1.0 / density).add_to(chunk);
             }
+        }
+        for k in 0..begin {
+            values[k] = values[2 * half - k];
         }
         Self { first, density, values }
     }
@@ -64,6 +65,38 @@ impl Covariance {
         let part = place - place.floor();
         let values = &self.values[start..start + ORDER];
         values.iter().zip(lagrange(part)).map(|(value, weight)| value * weight).sum()
+    }
+}
+
+/// Some terms at one time, which turn from value to value. Their products do not wait for one another.
+struct Phasors {
+    real: [f64; LANES],
+    imaginary: [f64; LANES],
+    turns: [Complex<f64>; LANES],
+}
+
+impl Phasors {
+    fn new(terms: &[Term], start: f64, step: f64) -> Self {
+        let (mut real, mut imaginary) = ([0.0; LANES], [0.0; LANES]);
+        let mut turns = [Complex::from(1.0); LANES];
+        for (lane, term) in terms.iter().enumerate() {
+            let phasor = term.amplitude * Complex::from_polar(1.0, TAU * term.frequency * start);
+            (real[lane], imaginary[lane]) = (phasor.re, phasor.im);
+            turns[lane] = Complex::from_polar(1.0, TAU * term.frequency * step);
+        }
+        Self { real, imaginary, turns }
+    }
+
+    fn add_to(mut self, values: &mut [f64]) {
+        let (cosines, sines) = (self.turns.map(|turn| turn.re), self.turns.map(|turn| turn.im));
+        for value in values {
+            *value += self.real.iter().sum::<f64>();
+            for lane in 0..LANES {
+                let (re, im) = (self.real[lane], self.imaginary[lane]);
+                self.real[lane] = re * cosines[lane] - im * sines[lane];
+                self.imaginary[lane] = re * sines[lane] + im * cosines[lane];
+            }
+        }
     }
 }
 

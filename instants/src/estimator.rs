@@ -81,7 +81,23 @@ impl Estimator {
     /// The covariances of some samples among one another. All instants of a call lie within
     /// [`Signals::longest`] of one another.
     pub fn set<'a>(&'a self, samples: &'a [Sample]) -> SampleSet<'a> {
-        SampleSet { signals: &self.signals, samples, among: among(&self.signals, samples) }
+        let mut among = self.signal_covariances(samples);
+        for (k, sample) in samples.iter().enumerate() {
+            among[(k, k)] += self.signals.noise_of(sample.converter);
+        }
+        SampleSet { signals: &self.signals, samples, among }
+    }
+
+    /// The covariances of some samples among one another without noise, the lower triangle.
+    pub(super) fn signal_covariances(&self, samples: &[Sample]) -> Mat {
+        let mut among = Mat::zeros(samples.len(), samples.len());
+        for (l, second) in samples.iter().enumerate() {
+            for (k, first) in samples.iter().enumerate().skip(l) {
+                let later = (first.instant - second.instant).0;
+                among[(k, l)] = self.signals.of_samples(first.converter, second.converter, later);
+            }
+        }
+        among
     }
 
     /// The taps `C^-1 r` for the target at each of `instants`.
@@ -105,15 +121,6 @@ pub struct SampleSet<'a> {
 }
 
 impl SampleSet<'_> {
-    /// The same where the signal has another power than its mean, 1: all is relative to that power.
-    #[must_use]
-    pub fn at_level(mut self, power: f64) -> Self {
-        for (k, sample) in self.samples.iter().enumerate() {
-            self.among[(k, k)] += self.signals.noise_of(sample.converter) * (1.0 / power - 1.0);
-        }
-        self
-    }
-
     /// r, one column for each instant.
     pub fn with_target(&self, instants: &[FastPeriods]) -> Mat {
         Mat::from_fn(self.samples.len(), instants.len(), |k, column| {
@@ -168,19 +175,6 @@ impl SampleSet<'_> {
         let noise = noise / self.signals.target_power();
         MeanSquare { signal: (total - noise).max(0.0), noise }
     }
-}
-
-/// The lower triangle of C.
-fn among(signals: &Signals, samples: &[Sample]) -> Mat {
-    let mut among = Mat::zeros(samples.len(), samples.len());
-    for (l, second) in samples.iter().enumerate() {
-        for (k, first) in samples.iter().enumerate().skip(l) {
-            let later = (first.instant - second.instant).0;
-            among[(k, l)] = signals.of_samples(first.converter, second.converter, later);
-        }
-        among[(l, l)] += signals.noise_of(second.converter);
-    }
-    among
 }
 
 /// The product of a symmetric matrix, of which the lower triangle is given, and another one.

@@ -4,7 +4,7 @@ use super::around::Around;
 use super::estimator::{Estimator, Sample};
 use super::recording::Recording;
 use hybank_core::units::FastPeriods;
-use hybank_linalg::{LinalgError, Mat, dot};
+use hybank_linalg::{LinalgError, Mat, PositiveFactor, dot};
 use rayon::prelude::*;
 
 /// The least power of a signal over its mean power.
@@ -22,55 +22,93 @@ pub struct HeldOut {
     pub variance: f64,
 }
 
-/// Leaves out, at each of `instants`, the nearest sample of every recording in turn. `reach` samples of each
-/// recording on either side predict it. `power` is the mean power of the signal.
-///
-/// With the covariances C of all samples x around an instant, the residual of sample k is
-/// `[C^-1 x]_k / [C^-1]_kk` and its variance `1 / [C^-1]_kk` (Rasmussen and Williams, Gaussian Processes for
-/// Machine Learning, section 5.4.2).
-///
-/// # Errors
-/// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
-pub fn held_out(
-    estimator: &Estimator,
-    recordings: &[Recording],
-    reach: usize,
-    power: f64,
-    instants: &[FastPeriods],
-) -> Result<Vec<HeldOut>, LinalgError> {
-    let around = |instant: &FastPeriods| around(estimator, recordings, reach, power, *instant);
-    let parts: Vec<Vec<HeldOut>> = instants.par_iter().map(around).collect::<Result<_, _>>()?;
-    Ok(parts.concat())
+/// At some instants the nearest sample of every recording, which is left out in turn, and the samples around
+/// that predict it. Their covariances are computed once, for whatever noise.
+#[derive(Debug, Clone)]
+pub struct Trials {
+    trials: Vec<Trial>,
 }
 
-fn around(
-    estimator: &Estimator,
-    recordings: &[Recording],
-    reach: usize,
-    power: f64,
-    origin: FastPeriods,
-) -> Result<Vec<HeldOut>, LinalgError> {
-    let within = estimator.signals().longest() * 0.5;
-    let around = Around::new(recordings, origin..origin, reach, within);
-    let (nearest, Around { samples, values, .. }) = (around.nearest(), around);
-    if nearest.is_empty() {
-        return Ok(Vec::new());
+#[derive(Debug, Clone)]
+struct Trial {
+    samples: Vec<Sample>,
+    values: Vec<f64>,
+    /// Those that are left out.
+    nearest: Vec<usize>,
+    /// The power around over the mean power.
+    level: f64,
+    /// C without noise, its lower triangle.
+    signal: Mat,
+}
+
+impl Trials {
+    /// At `instants`, with `reach` samples of each recording on either side. `power` is the mean power of the
+    /// signal.
+    pub fn new(
+        estimator: &Estimator,
+        recordings: &[Recording],
+        reach: usize,
+        power: f64,
+        instants: &[FastPeriods],
+    ) -> Self {
+        let trial = |instant: &FastPeriods| Trial::new(estimator, recordings, reach, power, *instant);
+        Self { trials: instants.par_iter().map(trial).collect() }
     }
-    // Sounds come and go, noise stays.
-    let gain = |sample: &Sample| estimator.signals().converters()[sample.converter].gain;
-    let squares = samples.iter().zip(&values).map(|(sample, value)| (value / gain(sample)).powi(2));
-    let level = squares.sum::<f64>() / (values.len().max(1) as f64 * power);
-    let level = level.max(LEAST_LEVEL);
-    let unit =
-        Mat::from_fn(samples.len(), nearest.len(), |k, column| f64::from(u8::from(nearest[column] == k)));
-    let columns = estimator.set(&samples).at_level(level).factor()?.solve(&unit);
-    let found = |(column, &k): (usize, &usize)| {
-        let of_inverse = &columns.as_slice()[column * samples.len()..(column + 1) * samples.len()];
-        HeldOut {
-            converter: samples[k].converter,
-            residual: dot(of_inverse, &values) / of_inverse[k],
-            variance: level / of_inverse[k],
+
+    /// The samples that were left out, for converters with these variances of their noise.
+    ///
+    /// With the covariances C of all samples x around an instant, the residual of sample k is
+    /// `[C^-1 x]_k / [C^-1]_kk` and its variance `1 / [C^-1]_kk` (Rasmussen and Williams, Gaussian Processes
+    /// for Machine Learning, section 5.4.2).
+    ///
+    /// # Errors
+    /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
+    pub fn held_out(&self, noise: &[f64]) -> Result<Vec<HeldOut>, LinalgError> {
+        let parts: Vec<Vec<HeldOut>> =
+            self.trials.par_iter().map(|trial| trial.held_out(noise)).collect::<Result<_, _>>()?;
+        Ok(parts.concat())
+    }
+}
+
+impl Trial {
+    fn new(
+        estimator: &Estimator,
+        recordings: &[Recording],
+        reach: usize,
+        power: f64,
+        origin: FastPeriods,
+    ) -> Self {
+        let within = estimator.signals().longest() * 0.5;
+        let around = Around::new(recordings, origin..origin, reach, within);
+        let (nearest, Around { samples, values, .. }) = (around.nearest(), around);
+        // Sounds come and go, noise stays.
+        let gain = |sample: &Sample| estimator.signals().converters()[sample.converter].gain;
+        let squares = samples.iter().zip(&values).map(|(sample, value)| (value / gain(sample)).powi(2));
+        let level = squares.sum::<f64>() / (values.len().max(1) as f64 * power);
+        let signal = estimator.signal_covariances(&samples);
+        Self { nearest, level: level.max(LEAST_LEVEL), signal, samples, values }
+    }
+
+    fn held_out(&self, noise: &[f64]) -> Result<Vec<HeldOut>, LinalgError> {
+        let Self { samples, values, nearest, level, signal } = self;
+        if nearest.is_empty() {
+            return Ok(Vec::new());
         }
-    };
-    Ok(nearest.iter().enumerate().map(found).collect())
+        let mut covariances = signal.clone();
+        for (k, sample) in samples.iter().enumerate() {
+            covariances[(k, k)] += noise[sample.converter] / level;
+        }
+        let unit =
+            Mat::from_fn(samples.len(), nearest.len(), |k, column| f64::from(u8::from(nearest[column] == k)));
+        let columns = PositiveFactor::new(&covariances)?.solve(&unit);
+        let found = |(column, &k): (usize, &usize)| {
+            let of_inverse = &columns.as_slice()[column * samples.len()..(column + 1) * samples.len()];
+            HeldOut {
+                converter: samples[k].converter,
+                residual: dot(of_inverse, values) / of_inverse[k],
+                variance: level / of_inverse[k],
+            }
+        };
+        Ok(nearest.iter().enumerate().map(found).collect())
+    }
 }

@@ -39,7 +39,7 @@ mod ways;
 pub use clock::{Clock, ClockError};
 pub use estimator::{Estimator, MeanSquare, Sample, SampleSet, Taps};
 pub use fusion::{Fused, FusionSettings, fuse};
-pub use heldout::{HeldOut, held_out};
+pub use heldout::{HeldOut, Trials};
 pub use learned::learned;
 pub use model::{Model, Prior};
 pub use recording::Recording;

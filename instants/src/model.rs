@@ -2,7 +2,7 @@
 
 use super::estimator::{Estimator, MeanSquare};
 use super::fusion::{FusionSettings, fuse};
-use super::heldout::{HeldOut, held_out};
+use super::heldout::{HeldOut, Trials};
 use super::learned::learned;
 use super::noise::NoiseSearch;
 use super::recording::Recording;
@@ -76,12 +76,11 @@ impl Model {
     ) -> Result<Self, LinalgError> {
         let longest = settings.longest(recordings);
         let power = mean_power(recordings, &prior.gains);
-        let first = |spectrum: Spectrum, share: f64| {
-            let noise = prior.gains.iter().zip(&prior.least_noise);
-            let noise = noise.map(|(gain, least)| least.max(share * power * gain * gain)).collect();
-            Self::new(spectrum, power, noise, prior)
+        let noise = |share: f64| -> Vec<f64> {
+            let all = prior.gains.iter().zip(&prior.least_noise);
+            all.map(|(gain, least)| least.max(share * power * gain * gain)).collect()
         };
-        let mut model = Self::best(recordings, prior.band, settings, &first)?;
+        let mut model = Self::best(recordings, prior, settings, power, &noise)?;
         model.measure_noise(recordings, prior, settings)?;
         for _ in 0..prior.passes {
             let Some((spectrum, power)) = model.relearned(recordings, settings, longest)? else { break };
@@ -95,33 +94,54 @@ impl Model {
     /// best.
     fn best(
         recordings: &[Recording],
-        band: Option<CyclesPerFastPeriod>,
+        prior: &Prior,
         settings: FusionSettings,
-        model: &dyn Fn(Spectrum, f64) -> Self,
+        power: f64,
+        noise: &dyn Fn(f64) -> Vec<f64>,
     ) -> Result<Self, LinalgError> {
-        let (longest, instants) = (settings.longest(recordings), instants(settings, TRIALS));
+        let longest = settings.longest(recordings);
+        let model = |spectrum: Spectrum, share: f64| Self::new(spectrum, power, noise(share), prior);
         let (low, high) = (CyclesPerFastPeriod(0.0), CyclesPerFastPeriod(0.5));
-        let spectra: Vec<Spectrum> = match band {
+        let spectra: Vec<Spectrum> = match prior.band {
             Some(band) => vec![Spectrum::flat(low..band, longest)],
             None => BANDS
                 .map(|part| CyclesPerFastPeriod(0.5 * f64::from(part) / f64::from(*BANDS.end())))
                 .map(|band| Spectrum::of_pieces([(low..band, 1.0), (band..high, BEYOND)], longest))
                 .collect(),
         };
-        let mut best = model(spectra[0].clone(), FIRST_NOISES[0]);
+        let mut best = None;
         let mut least = f64::INFINITY;
-        for (spectrum, noise) in
-            spectra.iter().flat_map(|spectrum| FIRST_NOISES.map(|noise| (spectrum, noise)))
-        {
-            let candidate = model(spectrum.clone(), noise);
-            let found =
-                held_out(&candidate.estimator, recordings, settings.reach, candidate.power, &instants)?;
-            let misfit = misfit(&found, candidate.power);
-            if misfit < least {
-                (best, least) = (candidate, misfit);
+        for spectrum in spectra {
+            let [quiet, ..] = FIRST_NOISES;
+            let candidate = model(spectrum, quiet);
+            let trials = candidate.trials(recordings, settings);
+            for share in FIRST_NOISES {
+                let noise = noise(share);
+                let misfit = candidate.misfit(&trials, &noise)?;
+                if misfit < least || best.is_none() {
+                    (best, least) = (Some(candidate.with_noise(noise)), misfit);
+                }
             }
         }
-        Ok(best)
+        Ok(best.unwrap_or_else(|| model(Spectrum::flat(low..high, longest), FIRST_NOISES[0])))
+    }
+
+    fn trials(&self, recordings: &[Recording], settings: FusionSettings) -> Trials {
+        let instants = instants(settings, TRIALS);
+        Trials::new(&self.estimator, recordings, settings.reach, self.power, &instants)
+    }
+
+    /// How badly samples that are left out are predicted with these variances of the noise.
+    fn misfit(&self, trials: &Trials, noise: &[f64]) -> Result<f64, LinalgError> {
+        let relative: Vec<f64> = noise.iter().map(|noise| noise / self.power).collect();
+        let found = trials.held_out(&self.estimator.signals().raised(&relative))?;
+        Ok(misfit(&found, self.power))
+    }
+
+    fn with_noise(&self, noise: Vec<f64>) -> Self {
+        let relative: Vec<f64> = noise.iter().map(|noise| noise / self.power).collect();
+        let estimator = Estimator::new(self.estimator.signals().with_noise(&relative));
+        Self { spectrum: self.spectrum.clone(), power: self.power, noise, estimator }
     }
 
     fn new(spectrum: Spectrum, power: f64, noise: Vec<f64>, prior: &Prior) -> Self {
@@ -183,17 +203,13 @@ impl Model {
         prior: &Prior,
         settings: FusionSettings,
     ) -> Result<(), LinalgError> {
-        let instants = instants(settings, TRIALS);
+        let trials = self.trials(recordings, settings);
         let full: Vec<f64> = prior.gains.iter().map(|gain| self.power * gain * gain).collect();
         let bounded = |levels: &[f64]| -> Vec<f64> {
             let all = levels.iter().zip(&full).zip(&prior.least_noise);
             all.map(|((level, full), least)| (level * full).max(*least)).collect()
         };
-        let misfit = |levels: &[f64]| -> Result<f64, LinalgError> {
-            let noise: Vec<f64> = bounded(levels).iter().map(|noise| noise / self.power).collect();
-            let estimator = Estimator::new(self.estimator.signals().with_noise(&noise));
-            Ok(misfit(&held_out(&estimator, recordings, settings.reach, self.power, &instants)?, self.power))
-        };
+        let misfit = |levels: &[f64]| self.misfit(&trials, &bounded(levels));
         let all: Vec<usize> = (0..recordings.len()).collect();
         let mut search = NoiseSearch::new(all.len());
         search.decades(&misfit)?;
@@ -201,9 +217,7 @@ impl Model {
         for i in all {
             search.walk(&[i], &misfit, SIGNIFICANT)?;
         }
-        self.noise = bounded(search.levels());
-        let noise: Vec<f64> = self.noise.iter().map(|noise| noise / self.power).collect();
-        self.estimator = Estimator::new(self.estimator.signals().with_noise(&noise));
+        *self = self.with_noise(bounded(search.levels()));
         Ok(())
     }
 }

@@ -5,6 +5,7 @@ use super::spectrum::Spectrum;
 use hybank_core::units::{CyclesPerFastPeriod, FastPeriods};
 use hybank_linalg::Complex;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// Least variance of the noise of a sample, relative to the sample's power: below it covariances have no
 /// digits that tell samples apart.
@@ -43,12 +44,12 @@ pub struct Signals {
     /// Number of the behaviour of each converter.
     behaviours: Vec<usize>,
     /// Of two samples of one converter, by behaviour, for a gain of 1.
-    own: Vec<Covariance>,
+    own: Vec<Arc<Covariance>>,
     /// Of a sample of one behaviour and a sample of another converter: c(t) for the first t later. By pairs
     /// (a, b) with b <= a, at a (a + 1) / 2 + b.
-    cross: Vec<Covariance>,
+    cross: Vec<Arc<Covariance>>,
     /// Of a sample of each behaviour and the target: c(t) for the sample t later.
-    with_target: Vec<Covariance>,
+    with_target: Vec<Arc<Covariance>>,
     /// P_0.
     target_power: f64,
     longest: FastPeriods,
@@ -75,9 +76,9 @@ impl Signals {
             deviation: converter.delay_deviation.0,
         };
         let behaviours = converters.iter().map(|converter| number_of(&mut kinds, of(converter))).collect();
-        let nodes = Nodes::new(spectrum, front_ends);
+        let mut nodes = Nodes::new(spectrum, front_ends);
         let exact = |front_end: usize| Behaviour { front_end, deviation: 0.0 };
-        let own: Vec<Covariance> =
+        let own: Vec<Arc<Covariance>> =
             kinds.iter().map(|kind| nodes.covariance(exact(kind.front_end), exact(kind.front_end))).collect();
         let pairs =
             kinds.iter().enumerate().flat_map(|(a, one)| kinds[..=a].iter().map(move |two| (one, two)));
@@ -98,10 +99,18 @@ impl Signals {
     }
 
     fn raise_noise(&mut self) {
-        for (converter, &behaviour) in self.converters.iter_mut().zip(&self.behaviours) {
-            let power = converter.gain.powi(2) * self.own[behaviour].at(0.0);
-            converter.noise = converter.noise.max(LEAST_NOISE * power);
-        }
+        let noise: Vec<f64> = self.converters.iter().map(|converter| converter.noise).collect();
+        let raised = self.raised(&noise);
+        self.converters.iter_mut().zip(raised).for_each(|(converter, noise)| converter.noise = noise);
+    }
+
+    /// Variances of the noise of the converters, or those that covariances resolve.
+    pub(super) fn raised(&self, variances: &[f64]) -> Vec<f64> {
+        let all = self.converters.iter().zip(&self.behaviours).zip(variances);
+        all.map(|((converter, &behaviour), variance)| {
+            variance.max(LEAST_NOISE * converter.gain.powi(2) * self.own[behaviour].at(0.0))
+        })
+        .collect()
     }
 
     /// The same with other variances of the noise, one for each converter.
@@ -162,6 +171,8 @@ fn number_of(kinds: &mut Vec<Behaviour>, kind: Behaviour) -> usize {
 struct Nodes<'a> {
     spectrum: &'a Spectrum,
     responses: Vec<Vec<Complex<f64>>>,
+    /// What was computed, by the numbers of the front ends and the variance of the time between them.
+    known: Vec<((usize, usize, f64), Arc<Covariance>)>,
 }
 
 impl<'a> Nodes<'a> {
@@ -169,18 +180,24 @@ impl<'a> Nodes<'a> {
         let response = |front_end: &&dyn Fn(CyclesPerFastPeriod) -> Complex<f64>| {
             spectrum.nodes().iter().map(|node| front_end(node.frequency)).collect()
         };
-        Self { spectrum, responses: front_ends.iter().map(response).collect() }
+        Self { spectrum, responses: front_ends.iter().map(response).collect(), known: Vec::new() }
     }
 
     /// Of the outputs of two front ends, the first at the later instant.
-    fn covariance(&self, one: Behaviour, two: Behaviour) -> Covariance {
+    fn covariance(&mut self, one: Behaviour, two: Behaviour) -> Arc<Covariance> {
         let variance = one.deviation.powi(2) + two.deviation.powi(2);
+        let key = (one.front_end, two.front_end, variance);
+        if let Some((_, known)) = self.known.iter().find(|(known, _)| *known == key) {
+            return Arc::clone(known);
+        }
         let term = |(q, node): (usize, &super::Node)| {
             let characteristic = (-0.5 * (TAU * node.frequency.0).powi(2) * variance).exp();
             let product = self.responses[one.front_end][q] * self.responses[two.front_end][q].conj();
             Term { frequency: node.frequency.0, amplitude: product * (node.power * characteristic) }
         };
         let terms: Vec<Term> = self.spectrum.nodes().iter().enumerate().map(term).collect();
-        Covariance::new(&terms, self.spectrum.longest().0)
+        let new = Arc::new(Covariance::new(&terms, self.spectrum.longest().0));
+        self.known.push((key, Arc::clone(&new)));
+        new
     }
 }

@@ -274,7 +274,9 @@ fn unequal_rates_are_fused_as_predicted() {
 fn residuals_have_the_variance_of_the_model() {
     let (estimator, recordings) = drifting(23);
     let instants: Vec<FastPeriods> = (0..300).map(|k| FastPeriods(150.0 + 18.1 * f64::from(k))).collect();
-    let found = held_out(&estimator, &recordings, 24, 1.0, &instants).unwrap();
+    let noise: Vec<f64> = estimator.signals().converters().iter().map(|converter| converter.noise).collect();
+    let trials = Trials::new(&estimator, &recordings, 24, 1.0, &instants);
+    let found = trials.held_out(&noise).unwrap();
     for converter in 0..2 {
         let of = found.iter().filter(|one| one.converter == converter);
         let ratios: Vec<f64> = of.map(|one| one.residual.powi(2) / one.variance).collect();

@@ -113,6 +113,11 @@ pub enum DesignError {
     /// Sample instants that do not determine a band-limited signal.
     #[error(transparent)]
     Sampling(#[from] SamplingError),
+    /// The spec says nothing of the band of the signal.
+    #[error(
+        "the spec states no band of the signal, without which samples at any instants tell nothing; add [signal] band = .."
+    )]
+    NoBand,
     /// The bank carries no spec, so its front ends are unknown.
     #[error(
         "this bank carries no spec (\"spec\": null): its front ends are unknown, so its error cannot be computed"

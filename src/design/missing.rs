@@ -1,11 +1,16 @@
 //! Missing samples of the converters of a bank, estimated from all samples around them.
 
 use super::DesignError;
-use super::problem::Problem;
+use super::deviations::Deviations;
+use super::problem::{Channel, Problem};
 use super::root_covariance::RootCovariance;
 use crate::bank::Bank;
+use crate::instants::{Converter, Estimator, Signals, Spectrum};
+use crate::linalg::Complex;
 use crate::pipeline::{GapEstimate, GapEstimator};
 use crate::spec::{ROUNDING_16_BITS, Spec, USUAL_RMS};
+use crate::units::{CyclesPerFastPeriod, FastPeriods, RadiansPerFastPeriod};
+use std::f64::consts::TAU;
 
 /// Samples of all converters on either side of a frame, about.
 const SAMPLES: usize = 48;
@@ -85,6 +90,41 @@ impl GapEstimator for MissingSamples {
             added_error: added.fold(0.0, f64::max) / self.root.power,
         }
     }
+}
+
+/// The estimator of the target of a bank from samples at any instants up to `longest` apart, by the same
+/// model.
+/// Deviations of delays and gains are those of the spec.
+///
+/// # Errors
+/// As [`MissingSamples::of_bank`]; [`DesignError::NoBand`] for a signal without one.
+pub fn instants_estimator(bank: &Bank, longest: FastPeriods) -> Result<Estimator, DesignError> {
+    let problem = Problem::of_bank(bank)?;
+    let band = problem.band.ok_or(DesignError::NoBand)?.map(|end| CyclesPerFastPeriod(end.0 / TAU));
+    let problem = with_noise(problem, bank.spec.as_ref());
+    // Noise counts for unit density in the band and its mirror there, and for a signal of power 1 here.
+    let density = RootCovariance::new(&problem, &[], 1, 0..=0).noise_scale / (2.0 * (band[1] - band[0]).0);
+    let deviations = bank.spec.as_ref().map(Deviations::of_spec).unwrap_or_default();
+    let converter = |(channel, noise): (&Channel, &f64)| {
+        let Deviations { delay, gain, .. } = deviations.get(channel.converter).copied().unwrap_or_default();
+        Converter {
+            front_end: channel.front_end,
+            gain: channel.gain,
+            noise: noise * density,
+            delay_deviation: delay,
+            gain_deviation: gain,
+        }
+    };
+    let converters = problem.channels.iter().zip(&problem.noise).map(converter).collect();
+    let response = |front_end: usize| {
+        let filter = &problem.front_ends[front_end];
+        move |f: CyclesPerFastPeriod| filter.response(RadiansPerFastPeriod(TAU * f.0))
+    };
+    let responses: Vec<_> = (0..problem.front_ends.len()).map(response).collect();
+    let responses: Vec<&dyn Fn(CyclesPerFastPeriod) -> Complex<f64>> =
+        responses.iter().map(|response| response as _).collect();
+    let spectrum = Spectrum::flat(band[0]..band[1], longest);
+    Ok(Estimator::new(Signals::new(&spectrum, &responses, problem.target, converters)))
 }
 
 /// The outputs of the middle frame, after the newest frame.

@@ -46,7 +46,7 @@ pub use figure_band::{BandSource, FigureBand};
 pub use length::Figure;
 pub use limits::{Stage, Stop, TIME_LIMIT, remedy};
 pub use methods::robust_fir::{RobustNorms, RobustStudy};
-pub use missing::MissingSamples;
+pub use missing::{MissingSamples, instants_estimator};
 pub use plant::LiftedPlant;
 pub use problem::Problem;
 pub use prove::certify;

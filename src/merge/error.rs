@@ -1,9 +1,10 @@
 //! Why recordings cannot be merged, and what a reader of the result must know.
 
 use crate::align::{AlignError, AlignWarning};
+use crate::design::DesignError;
 use crate::instants::ClockError;
 use crate::linalg::LinalgError;
-use crate::messages::Quoted;
+use crate::messages::{Quoted, counted};
 use crate::units::Hertz;
 
 /// Why recordings cannot be merged.
@@ -73,6 +74,35 @@ pub enum MergeError {
         /// What a spec says of them.
         refused: String,
     },
+    /// A bank whose converters have rates of their own.
+    #[error(
+        "the converters of the bank have rates of their own; a table of delays is for converters of one rate"
+    )]
+    OwnRates,
+    /// A table of delays of other converters.
+    #[error(
+        "the table has {} of delays, and the bank has {wanted} channels; give a time and a delay for each channel",
+        counted(.given, "column")
+    )]
+    Columns {
+        /// Columns of the table.
+        given: usize,
+        /// Channels of the bank.
+        wanted: usize,
+    },
+    /// Delays that turn time back.
+    #[error(
+        "the delays of channel {channel} change by a sample and more from one line to the next ({problem})"
+    )]
+    Track {
+        /// From 1.
+        channel: usize,
+        /// What is wrong.
+        problem: ClockError,
+    },
+    /// The converters of a bank are not known.
+    #[error(transparent)]
+    Design(#[from] DesignError),
     /// Starts and clocks cannot be found.
     #[error(transparent)]
     Align(#[from] AlignError),

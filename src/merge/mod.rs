@@ -7,8 +7,10 @@
 
 mod clocks;
 mod error;
+mod tracked;
 
 pub use error::{MergeError, MergeWarning};
+pub use tracked::{DelayTrack, Tracked, fuse_tracked};
 
 use crate::align::Step;
 use crate::calibrate::Record;

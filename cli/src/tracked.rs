@@ -1,0 +1,95 @@
+//! `fuse --track`: delays that change, from a table.
+
+use super::capture_file::unread;
+use super::print::{Failure, InFile, failed, failed_at, print, print_report, warn};
+use super::run::Job;
+use super::written::{Mono, begin_recording};
+use hybank::captures::Captures;
+use hybank::files::commit_all;
+use hybank::io::{MultiReader, read_stamped};
+use hybank::merge::{DelayTrack, Tracked, fuse_tracked};
+use hybank::messages::{Quoted, counted};
+use hybank::quantity::readable;
+use hybank::units::Seconds;
+use std::path::{Path, PathBuf};
+
+/// The option.
+#[derive(Debug, clap::Args)]
+pub(super) struct TrackArgs {
+    /// Follow delays that change: a table (.csv) of a time and the delay of each channel, both in seconds,
+    /// with headings, as `time,delay 1,delay 2`. The delays of the spec do not count then, and taps are made
+    /// for those at hand; lost samples are left out
+    #[arg(long, value_name = "FILE", conflicts_with_all =
+          ["bit_true", "algorithm", "gaps", "keep_latency", "measure", "report", "interleaved"])]
+    track: Option<PathBuf>,
+}
+
+#[derive(Debug, serde::Serialize)]
+struct Report {
+    samples: usize,
+    rate: f64,
+    predicted_snr_db: f64,
+    worst_second_db: f64,
+    /// After the first sample.
+    worst_second_at: f64,
+    warnings: Vec<String>,
+}
+
+impl TrackArgs {
+    /// The table, if one is given.
+    pub(super) fn file(&self) -> Option<&Path> {
+        self.track.as_deref()
+    }
+}
+
+/// Fuses what `reader` gives by the delays of a table.
+pub(super) fn fuse(job: &Job<'_>, table: &Path, mut reader: MultiReader) -> Result<(), Failure> {
+    let track = read(table)?;
+    let rate = job.output_rate(&reader)?;
+    if reader.is_complex() {
+        return Err(Failure::Input(
+            "--track: the samples are complex, and only real ones are fused by a table".into(),
+        ));
+    }
+    let captures = Captures::read(&mut reader, usize::MAX).map_err(unread)?;
+    let channels: Vec<Vec<f64>> = captures.channels.into_iter().map(|channel| channel.samples).collect();
+    let tracked = fuse_tracked(job.bank, &channels, &track).in_file(table)?;
+    let samples = &tracked.samples;
+    let mono = Mono { samples, imaginary: None, rate, format: job.format, container: job.container };
+    commit_all(begin_recording(job.output, mono, job.args.force)?).map_err(failed)?;
+    let warnings: Vec<String> = reader.warnings().iter().map(ToString::to_string).collect();
+    warnings.iter().for_each(|text| warn(text));
+    report(job, &tracked, rate, warnings)
+}
+
+/// Reads the table of delays.
+fn read(path: &Path) -> Result<DelayTrack, Failure> {
+    let table = read_stamped(path).map_err(failed)?.ok_or_else(|| {
+        failed_at(path, "no table of delays: its first line has no headings of which the first is a time, as `time,delay 1,delay 2`")
+    })?;
+    let delays = table.columns.into_iter().map(|column| column.into_iter().map(Seconds).collect()).collect();
+    Ok(DelayTrack { times: table.stamps, delays })
+}
+
+fn report(job: &Job<'_>, tracked: &Tracked, rate: f64, warnings: Vec<String>) -> Result<(), Failure> {
+    let report = Report {
+        samples: tracked.samples.len(),
+        rate,
+        predicted_snr_db: tracked.snr.0,
+        worst_second_db: tracked.worst_second.0,
+        worst_second_at: tracked.worst_at.0,
+        warnings,
+    };
+    if job.args.json {
+        return print_report(&report, job.output);
+    }
+    print(&format!(
+        "{}: {} at {}, predicted SNR {:.1} dB, {:.1} dB in the worst second ({:.1} s after the beginning)\n",
+        Quoted(job.output),
+        counted(report.samples, "sample"),
+        readable(rate, "S/s"),
+        report.predicted_snr_db,
+        report.worst_second_db,
+        report.worst_second_at
+    ))
+}

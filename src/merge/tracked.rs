@@ -1,0 +1,174 @@
+//! Converters whose delays change: the fusion of their recordings by a table of delays over time.
+
+use super::error::MergeError;
+use crate::bank::Bank;
+use crate::design;
+use crate::instants::{Clock, Fused, FusionSettings, Recording, fuse};
+use crate::units::{Decibels, FastPeriods, Seconds};
+
+/// Samples of each recording on either side of an output.
+const REACH: usize = 24;
+
+/// The delays of all converters at some times, on lines between them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DelayTrack {
+    /// After the first frame, ascending.
+    pub times: Vec<Seconds>,
+    /// Those of each converter, as many as times: D_i as in a spec.
+    pub delays: Vec<Vec<Seconds>>,
+}
+
+/// The fused recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tracked {
+    /// M for each frame; the first one is at the time of the first frame.
+    pub samples: Vec<f64>,
+    /// The predicted signal-to-noise ratio, for a signal that is flat over the band.
+    pub snr: Decibels,
+    /// Of the worst second.
+    pub worst_second: Decibels,
+    /// When it begins.
+    pub worst_at: Seconds,
+}
+
+/// Fuses the recordings of the converters of a bank, NaN where samples were lost. Taps are made for the
+/// delays at hand ([`crate::instants`]); those of the bank are not used.
+///
+/// # Errors
+/// [`MergeError`]: for a bank without a spec, a band or one rate of its converters; for a table of other
+/// converters, or of delays that jump by a sample and more.
+pub fn fuse_tracked(bank: &Bank, channels: &[Vec<f64>], track: &DelayTrack) -> Result<Tracked, MergeError> {
+    if bank.samples.iter().any(|samples| *samples != 1) {
+        return Err(MergeError::OwnRates);
+    }
+    if track.delays.len() != bank.channel_count() {
+        return Err(MergeError::Columns { given: track.delays.len(), wanted: bank.channel_count() });
+    }
+    let recordings: Vec<Recording> = channels
+        .iter()
+        .enumerate()
+        .map(|(i, samples)| {
+            let offset = bank.offsets[i];
+            let own = samples.iter().map(|x| x - offset).collect();
+            Ok(Recording::new(own, clock(bank, track, i)?, i))
+        })
+        .collect::<Result<_, MergeError>>()?;
+    let count = channels.first().map_or(0, Vec::len) * bank.ratio;
+    let settings = FusionSettings { first: FastPeriods(0.0), count, reach: REACH };
+    let estimator = design::instants_estimator(bank, settings.longest(&recordings))?;
+    let fused = fuse(&estimator, &recordings, settings)?;
+    Ok(judged(fused, bank))
+}
+
+/// When a converter takes its samples: sample k at kM - D.
+fn clock(bank: &Bank, track: &DelayTrack, converter: usize) -> Result<Clock, MergeError> {
+    let period = bank.ratio as f64;
+    let knot = |(time, delay): (&Seconds, &Seconds)| {
+        let [nominal, delay] = [*time, *delay].map(|time| time.in_fast_periods(bank.fast_period).0);
+        (nominal / period, FastPeriods(nominal - delay))
+    };
+    let mut knots: Vec<(f64, FastPeriods)> =
+        track.times.iter().zip(&track.delays[converter]).map(knot).collect();
+    // Before the first time and after the last one the delay stays.
+    if let (Some(&(first, begin)), Some(&(last, end))) = (knots.first(), knots.last()) {
+        knots.insert(0, (first - 1.0, begin - FastPeriods(period)));
+        knots.push((last + 1.0, end + FastPeriods(period)));
+    }
+    Clock::through(knots).map_err(|problem| MergeError::Track { channel: converter + 1, problem })
+}
+
+fn judged(fused: Fused, bank: &Bank) -> Tracked {
+    let errors: Vec<f64> = fused.errors.iter().map(|error| error.total()).collect();
+    let block = Seconds(fused.block as f64 * bank.fast_period.0);
+    let second = ((1.0 / block.0).round() as usize).clamp(1, errors.len().max(1));
+    let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
+    let of_second: Vec<f64> = errors.windows(second).map(mean).collect();
+    let worst = (0..of_second.len()).max_by(|a, b| of_second[*a].total_cmp(&of_second[*b])).unwrap_or(0);
+    let ratio = |error: f64| Decibels::of_power(1.0 / error.max(f64::MIN_POSITIVE));
+    Tracked {
+        snr: ratio(mean(&errors)),
+        worst_second: ratio(of_second.get(worst).copied().unwrap_or_default()),
+        worst_at: Seconds(worst as f64 * block.0),
+        samples: fused.samples,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spec::Spec;
+    use std::f64::consts::TAU;
+
+    const SPEC: &str = "fast_rate = 48000\nratio = 2\n\
+        [target]\nfilter = { family = \"butterworth\", order = 4, cutoff = 14000 }\n\
+        [signal]\nband = 18000\n[[channel]]\ndelay = 0\nbits = 16\n\
+        [[channel]]\ndelay = \"0.9 samples\"\ngain = -0.6\nbits = 16\n\
+        [design]\nmethod = \"h2\"\ntaps = 48\n";
+
+    fn bank() -> Bank {
+        let spec = Spec::from_toml(SPEC, "test").unwrap();
+        design::design(&spec, &design::Options::without_proof()).unwrap().bank
+    }
+
+    /// What passes the Butterworth filter, which both converters and the target have: tones.
+    fn value(t: f64) -> f64 {
+        let tone = |k: u32| {
+            let f = 300.0 + 17_600.0 * (f64::from(k) / 61.0) * (1.0 + 0.2 * f64::from(k % 3)) / 1.4;
+            (TAU * f * t + f64::from(k * k)).cos() / (1.0 + (f / 14_000.0).powi(8)).sqrt()
+        };
+        0.04 * (0..61).map(tone).sum::<f64>()
+    }
+
+    fn rounded(x: f64) -> f64 {
+        (x * 32768.0).round() / 32768.0
+    }
+
+    /// A delay that drifts over a quarter of a slow period, known every 50 ms.
+    #[test]
+    fn taps_follow_a_drifting_delay() {
+        let (bank, frames) = (bank(), 24_000);
+        let delay = |t: f64| 18.75e-6 + 12e-6 * t * t;
+        let times: Vec<Seconds> = (0..=20).map(|k| Seconds(0.05 * f64::from(k))).collect();
+        let track = DelayTrack {
+            delays: vec![vec![Seconds(0.0); 21], times.iter().map(|t| Seconds(delay(t.0))).collect()],
+            times,
+        };
+        let own = |k: usize| k as f64 / 24_000.0;
+        let first: Vec<f64> = (0..frames).map(|k| rounded(value(own(k)))).collect();
+        let on_lines = |t: f64| {
+            let k = ((t / 0.05) as usize).min(19);
+            let part = t / 0.05 - k as f64;
+            delay(0.05 * k as f64) * (1.0 - part) + delay(0.05 * (k + 1) as f64) * part
+        };
+        let second: Vec<f64> =
+            (0..frames).map(|k| rounded(-0.6 * value(own(k) - on_lines(own(k))))).collect();
+        let tracked = fuse_tracked(&bank, &[first, second], &track).unwrap();
+        let inner = 200..2 * frames - 200;
+        let (mut error, mut power) = (0.0, 0.0);
+        for n in inner {
+            let truth = value(n as f64 / 48_000.0);
+            error += (tracked.samples[n] - truth).powi(2);
+            power += truth * truth;
+        }
+        let snr = 10.0 * (power / error).log10();
+        // Tones are no flat spectrum.
+        assert!((snr - tracked.snr.0).abs() < 6.0, "{snr} measured, {} predicted", tracked.snr);
+        assert!(snr > 60.0 && tracked.worst_second.0 <= tracked.snr.0 + 1e-9, "{snr}");
+    }
+
+    #[test]
+    fn impossible_tables_are_refused() {
+        let bank = bank();
+        let channels = vec![vec![0.0; 100]; 2];
+        let track = |delays: Vec<Vec<f64>>| DelayTrack {
+            times: vec![Seconds(0.0), Seconds(1e-3)],
+            delays: delays.into_iter().map(|column| column.into_iter().map(Seconds).collect()).collect(),
+        };
+        let refused = |delays| fuse_tracked(&bank, &channels, &track(delays)).unwrap_err().to_string();
+        assert!(refused(vec![vec![0.0; 2]]).contains("1 column of delays, and the bank has 2 channels"));
+        assert!(refused(vec![vec![0.0; 2], vec![0.0, 2e-3]]).contains("channel 2"));
+        let bare = Bank { spec: None, ..bank.clone() };
+        let error = fuse_tracked(&bare, &channels, &track(vec![vec![0.0; 2]; 2])).unwrap_err();
+        assert!(error.to_string().contains("no spec"), "{error}");
+    }
+}
