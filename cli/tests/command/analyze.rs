@@ -1,6 +1,6 @@
 //! `hybank analyze` over boxes of errors.
 
-use crate::support::{Desk, THESIS, text};
+use crate::support::{Desk, THESIS};
 use serde_json::Value;
 
 fn desk() -> Desk {
@@ -62,18 +62,6 @@ fn errors_of_delays_have_units() {
     let in_seconds = gamma("1e-3,-2e-3");
     assert_eq!(gamma("1ms,-2ms"), in_seconds);
     assert_ne!(gamma("0,0"), in_seconds);
-}
-
-/// Two delays that doubles do not resolve: the bound is unknown, not zero.
-#[test]
-fn an_unknown_noncausal_bound_is_called_unknown() {
-    let desk = desk();
-    let output = desk.run(&["analyze", "bank.json", "--delay-error", "0,0.6000000000001"], &[]);
-    assert!(output.status.success(), "{output:?}");
-    let line = text(&output.stdout).lines().find(|line| line.starts_with("noncausal")).unwrap().to_owned();
-    assert!(line.contains("unknown") && !line.contains("0.0000"), "{line}");
-    let json = desk.json(&["analyze", "bank.json", "--delay-error", "0,0.6000000000001", "--json"]);
-    assert_eq!(json["noncausal"], Value::Null);
 }
 
 /// A gamma of 4e-10 is printed with its digits, not as 0.000000000.

@@ -258,17 +258,6 @@ fn a_recording_whose_name_is_taken_stays_under_its_hidden_name() {
 }
 
 #[test]
-fn a_name_that_is_too_long_is_refused_before_the_first_sample() {
-    let bench = Bench::new();
-    let name = "x".repeat(256);
-    let output = bench.run(&["-o", &name], &bytes(&frames(3)));
-    assert_eq!(output.status.code(), Some(1), "{output:?}");
-    let message = text(&output.stderr);
-    assert!(message.contains("cannot create it: File name too long"), "{message}");
-    assert!(bench.unfinished_bytes().is_none());
-}
-
-#[test]
 fn a_closed_pipe_ends_quietly() {
     let bench = Bench::new();
     let mut child = bench.spawn(&[]);

@@ -54,22 +54,6 @@ fn a_scale_at_which_all_integer_taps_are_zero_is_refused() {
     desk.good(&design);
 }
 
-#[test]
-fn a_bank_without_any_error_loses_nothing_by_integers() {
-    let desk = Desk::with_spec(THESIS);
-    let exact = "fast_period = 1.0\nratio = 1\nlatency = 0\nchannel = [{ delay = 0 }]\n\
-                 target = { filter = { num = [0.25], den = [1.0, 1.0, 0.25] } }\n\
-                 design = { method = \"fir\", taps = 1, bits = 4 }\n";
-    desk.write("exact.toml", exact);
-    let report = desk.json(&["design", "exact.toml", "-o", "b.json", "--json"]);
-    assert_eq!(number(&report, "/gamma/norm"), 0.0);
-    assert_eq!(number(&report, "/words/loss_db"), 0.0);
-    assert!(
-        desk.good(&["design", "exact.toml", "-o", "b.json", "--force", "--verbose"])
-            .contains("gamma is 0.0000 dB above")
-    );
-}
-
 /// Plain interleaving of delays 0 and 1: the mean squares of real and of integer taps are rounding.
 #[test]
 fn interleaving_without_any_error_loses_nothing_and_leaves_nothing_open() {

@@ -1,6 +1,6 @@
 //! One file or pipe in which converters take turns.
 
-use crate::support::{Desk, bytes, interleaved, wav};
+use crate::support::{Desk, bytes, wav};
 use serde_json::json;
 
 /// A bank of three converters with the delays 0, 2 and 1 of a slow period of 3, whose channels go unchanged
@@ -44,21 +44,6 @@ fn the_converter_that_samples_first_comes_first() {
 }
 
 #[test]
-fn one_file_gives_the_bytes_of_a_file_per_channel() {
-    let desk = Desk::new();
-    let (a, b) = (
-        (0..30_000).map(|k| ((k * 31) % 97) as f32 / 97.0).collect::<Vec<f32>>(),
-        (0..30_000).map(|k| ((k * 17) % 89) as f32 / 89.0).collect::<Vec<f32>>(),
-    );
-    wav::write_pair(&desk, &a, &b);
-    wav::write(&desk, "capture.wav", 1, 48_000, &interleaved(&a, &b));
-    desk.good(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "1.wav"]);
-    // Equal delays: the channels take turns in their order.
-    desk.good(&["fuse", "bank.json", "capture.wav", "-o", "2.wav", "--interleaved", "2"]);
-    assert!(desk.read("1.wav") == desk.read("2.wav"));
-}
-
-#[test]
 fn pipes_are_read_in_turns_too() {
     let desk = Desk::empty();
     write_bank(&desk, [0.0, 2.0, 1.0]);
@@ -75,45 +60,5 @@ fn pipes_are_read_in_turns_too() {
     assert!(cut.stdout == bytes(&by_channel(7)), "{cut:?}");
     assert!(
         String::from_utf8(cut.stderr).unwrap().contains("the last frame is cut (5 bytes of it are there)")
-    );
-}
-
-#[test]
-fn timestamps_count_whole_turns() {
-    let desk = Desk::empty();
-    write_bank(&desk, [0.0, 2.0, 1.0]);
-    desk.write("capture.sigmf-data", bytes(&capture(4)));
-    let meta = |index: u64| {
-        let captures = json!([
-            { "core:sample_start": 0, "core:global_index": 0 },
-            { "core:sample_start": 6, "core:global_index": index }
-        ]);
-        let global =
-            json!({ "core:datatype": "rf32_le", "core:sample_rate": 3000.0, "core:version": "1.0.0" });
-        desk.write("capture.sigmf-meta", json!({ "global": global, "captures": captures }).to_string());
-    };
-    let args = [
-        "fuse",
-        "three.json",
-        "capture.sigmf-meta",
-        "-o",
-        "y.wav",
-        "--interleaved",
-        "3",
-        "--gaps",
-        "zero",
-        "--force",
-    ];
-    meta(9);
-    // The gap is reported.
-    assert!(desk.run(&args, &[]).status.success());
-    let mut want = by_channel(4);
-    want.splice(6..6, [0.0; 3]);
-    assert_eq!(wav::samples(&desk, "y.wav"), want);
-    meta(8);
-    desk.refused(
-        1,
-        &args,
-        &["capture.sigmf-meta", "global_index 8", "beginning of a frame of 3 time-interleaved"],
     );
 }
