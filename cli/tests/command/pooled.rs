@@ -80,8 +80,9 @@ fn judged(desk: &Desk, spec: &str) -> (f64, f64) {
 /// Nine captures of 8 bits, each with a tone of its own, say more together than one.
 #[test]
 fn pooled_captures_of_quad_converters() {
-    let is_all = trials::is_slow("pooled captures: the second unit, and each capture alone");
-    let (units, alone) = if is_all { (2, 0..9) } else { (1, 4..5) };
+    let is_all =
+        trials::is_slow("pooled captures: the second unit, without calibration, and each capture alone");
+    let (units, alone) = if is_all { (2, 0..9) } else { (1, 0..0) };
     for (unit, errors) in UNITS.into_iter().enumerate().take(units) {
         let desk = Desk::empty();
         desk.write("quad.toml", QUAD);
@@ -96,15 +97,20 @@ fn pooled_captures_of_quad_converters() {
             desk.report(&[&["calibrate", "quad.toml"], &captures[..], &how].concat());
             judged(&desk, "m.toml")
         };
-        let before = judged(&desk, "quad.toml");
+        let before = is_all.then(|| judged(&desk, "quad.toml"));
         let single: Vec<(f64, f64)> = alone.clone().map(|k| calibrated(&names[k..=k])).collect();
         let pooled = calibrated(&names);
         let shown = |found: &(f64, f64)| format!("{:.1} dBc, {:.2} dB", found.0, found.1);
         let each: Vec<String> = single.iter().map(shown).collect();
-        println!("unit {}: {} before; {} by all nine", unit + 1, shown(&before), shown(&pooled));
+        println!(
+            "unit {}: {} before; {} by all nine",
+            unit + 1,
+            before.as_ref().map_or_else(String::new, shown),
+            shown(&pooled)
+        );
         println!("        by one: {}", each.join(" | "));
         let least = single.iter().map(|found| found.0).fold(f64::INFINITY, f64::min);
-        assert!(before.0 > -45.0 && before.1 < 37.0, "{before:?}");
+        assert!(before.is_none_or(|before| before.0 > -45.0 && before.1 < 37.0), "{before:?}");
         assert!(pooled.0 < -76.0 && pooled.0 < least + 3.0, "{single:?} {pooled:?}");
         assert!(pooled.1 > 40.0, "{pooled:?}");
     }
