@@ -314,43 +314,4 @@ mod tests {
         let line = lines(&figures).pop().unwrap();
         assert!(line.contains(" use that, or give the bank more latency;"), "{line}");
     }
-
-    #[test]
-    fn what_is_none_is_one_sentence() {
-        let mut figures = figures(60.0, 48.0);
-        figures.image = figures.gain_error;
-        figures.setup.has_uncertain_cutoffs = true;
-        let words = lines(&figures);
-        assert!(words[0].ends_with("; uncertain cut-offs not counted"), "{}", words[0]);
-        assert_eq!(words[1], "image: none, below the rounding of double precision in 0 to 9 kHz");
-        figures.setup = Setup { ratio: 1, channels: 1, ..figures.setup };
-        figures.simple.pop();
-        let words = lines(&figures);
-        assert_eq!(words[1], "image: none, one channel at the output rate has no images");
-        assert!(
-            words[3].ends_with("over a cubic spline (48.0 dB); all with 16-bit converters"),
-            "{}",
-            words[3]
-        );
-    }
-
-    #[test]
-    fn parts_are_named_and_missing_tones_are_said() {
-        let mut figures = figures(60.0, 48.0);
-        let [noise_db, delays_db, offsets_db] = [61.0, 70.0, 65.0].map(|db| Some(Decibels(db)));
-        figures.snr = Snr { noise_db, delays_db, offsets_db, ..figures.snr };
-        figures.snr_16_bits_db = None;
-        let uncertain = lines(&figures).remove(1);
-        let counted = "at 8.5 kHz; rms over uncertain delays and gains; uncertain offsets not counted";
-        assert!(uncertain.ends_with(counted), "{uncertain}");
-        figures.image = None;
-        figures.target_vanishes = true;
-        let lines = lines(&figures);
-        let parts = "; from the signal 60.0 dB, the converters' noise 61.0 dB, uncertain delays 70.0 dB, \
-                     uncertain offsets 65.0 dB";
-        assert!(lines[0].ends_with(parts), "{}", lines[0]);
-        assert_eq!(lines[1], "image: none, some tone in 0 to 9 kHz does not come through at all");
-        assert!(lines[2].ends_with("left out"), "{}", lines[2]);
-        assert!(lines[3].ends_with("alone at best (20.0 dB)"), "{}", lines[3]);
-    }
 }

@@ -103,39 +103,6 @@ mod tests {
         );
     }
 
-    /// One channel, the ratio 1, no latency, a low cut-off.
-    #[test]
-    fn odd_specs_are_said_plainly() {
-        let said = |rate: &str, ratio: usize, latency: usize, delay: &str| {
-            let spec = Spec::from_toml(
-                &format!(
-                    "{rate}\nratio = {ratio}\nlatency = {latency}\nchannel = [{{ delay = {delay} }}]\n\
-                     target = {{ filter = {{ num = [0.025], den = [1.0, 0.025] }} }}\ndesign = {{ method = \"iir\" }}"
-                ),
-                "spec.toml",
-            );
-            understood(&spec.unwrap())
-        };
-        let normalised = "normalised time (fast period 1) from one converter at";
-        assert_eq!(
-            said("fast_period = 1.0", 1, 1, "1"),
-            format!(
-                "{normalised} the output rate; target -3 dB at 0.0080 of Nyquist; delay 1 sample; latency 1 sample"
-            )
-        );
-        assert!(
-            said("fast_period = 1.0", 3, 0, "0")
-                .starts_with(&format!("{normalised} 1/3 of the output rate;"))
-        );
-        assert!(
-            said("fast_rate = \"8 S/s\"", 1, 0, "0")
-                .starts_with("8 S/s from one converter of the same rate;")
-        );
-        let last = said("fast_rate = \"8 S/s\"", 2, 0, "0");
-        assert!(last.starts_with("8 S/s from one converter at 4 S/s;"), "{last}");
-        assert!(last.ends_with("; delay 0 samples; latency 0 samples"), "{last}");
-    }
-
     #[test]
     fn normalised_time_has_no_unit() {
         let spec = Spec::from_toml(

@@ -103,17 +103,4 @@ mod tests {
         assert_eq!(real.parts().0, "step@0.5+tones:3".parse().unwrap());
         assert_eq!(source("tones:3").parts(), ("tones:3".parse().unwrap(), Source::Tones(vec![])));
     }
-
-    #[test]
-    fn it_is_described_in_hertz() {
-        for (text, words) in [
-            ("ctones:-250kHz", "a complex tone at -250 kHz"),
-            ("ctones:1kHz,2kHz+step@1s", "a step at 1 s plus complex tones at 1 kHz, 2 kHz"),
-            ("tones:440Hz", "a tone at 440 Hz"),
-        ] {
-            assert_eq!(source(text).to_string(), words);
-        }
-        let refused = "ctones:".parse::<ComplexSource>().unwrap_err().to_string();
-        assert!(refused.contains("`ctones:`"), "{refused}");
-    }
 }

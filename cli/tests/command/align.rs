@@ -135,7 +135,7 @@ fn drifts_are_found_within_their_intervals() {
     let case = |event, seconds, ppm, late| Case { event, seconds, ppm, late };
     let mut cases = vec![
         case(Event::Noise, 6.0, 20.0, 0.31),
-        case(Event::Music, 14.0, -100.0, 10.0),
+        case(Event::Music, 9.0, -100.0, 4.0),
         case(Event::Speech, 8.0, 1.0, -2.0),
     ];
     if is_sweep {

@@ -1,6 +1,7 @@
 //! `hybank analyze` over boxes of errors.
 
-use crate::support::{Desk, THESIS, text};
+use crate::calibrate::design;
+use crate::support::{Desk, THESIS};
 use serde_json::Value;
 
 fn desk() -> Desk {
@@ -64,25 +65,13 @@ fn errors_of_delays_have_units() {
     assert_ne!(gamma("0,0"), in_seconds);
 }
 
-/// Two delays that doubles do not resolve: the bound is unknown, not zero.
-#[test]
-fn an_unknown_noncausal_bound_is_called_unknown() {
-    let desk = desk();
-    let output = desk.run(&["analyze", "bank.json", "--delay-error", "0,0.6000000000001"], &[]);
-    assert!(output.status.success(), "{output:?}");
-    let line = text(&output.stdout).lines().find(|line| line.starts_with("noncausal")).unwrap().to_owned();
-    assert!(line.contains("unknown") && !line.contains("0.0000"), "{line}");
-    let json = desk.json(&["analyze", "bank.json", "--delay-error", "0,0.6000000000001", "--json"]);
-    assert_eq!(json["noncausal"], Value::Null);
-}
-
 /// A gamma of 4e-10 is printed with its digits, not as 0.000000000.
 #[test]
 fn tiny_numbers_have_digits() {
     let spec = THESIS.replace("num = [0.25], den = [1.0, 1.0, 0.25]", TINY);
     assert_ne!(spec, THESIS);
     let desk = Desk::with_spec(&spec);
-    desk.good(&["design", "spec.toml", "-o", "bank.json"]);
+    design(&desk, "spec.toml");
     let told = desk.good(&["analyze", "bank.json", "--delay-box", "1e-9samples"]);
     for line in ["gamma", "noncausal", "rms error", "worst case", "attained"] {
         let found = told.lines().find(|text| text.starts_with(line)).unwrap();

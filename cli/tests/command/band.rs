@@ -1,6 +1,7 @@
 //! The signal's band from a new user's first result to calibrated converters.
 
-use crate::support::{Desk, THESIS};
+use crate::calibrate::design;
+use crate::support::{Desk, THESIS, text};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -24,7 +25,8 @@ fn readme_block(language: &str) -> String {
 #[test]
 fn the_first_result_keeps_its_promise_and_beats_the_spline() {
     let desk = Desk::with_spec(&readme_block("toml"));
-    let promised = desk.json(&["design", "spec.toml", "-o", "bank.json", "--json"]);
+    design(&desk, "spec.toml");
+    let promised = desk.json(&["analyze", "bank.json", "--json"]);
     desk.good(&["simulate", "bank.json", "--source", "chirp:50Hz..13kHz@1s", "-o", "captures"]);
     desk.good(&["fuse", "bank.json", "captures/ch1.wav", "captures/ch2.wav", "-o", "fused.wav"]);
     let found = desk.json(&["measure", "fused.wav", "--ref", "captures/target.wav", "--json"]);
@@ -75,21 +77,19 @@ fn calibrated_interleaved_converters_have_small_spurs_up_to_the_end_of_the_band(
     let rest =
         ["-o", "measured.toml", "--reference", "4", "--tone", TONES, "--fit", "delay,gain,offset,cutoff"];
     with(&["calibrate", "nominal.toml"], &training, &rest);
-    desk.good(&["design", "measured.toml", "-o", "measured.json"]);
-    for tone in ["62.1MHz", "183.1MHz", "392.1MHz"] {
+    let tones = ["392.1MHz", "62.1MHz", "183.1MHz"];
+    let is_slow = trials::is_slow("calibrated interleaved converters: uncertain delays and three tones");
+    if !is_slow {
+        // Values that are taken as exact.
+        let measured = text(&desk.read("measured.toml"));
+        desk.write("measured.toml", measured.split("[uncertainty]").next().unwrap_or_default());
+    }
+    design(&desk, "measured.toml");
+    for tone in if is_slow { &tones[..] } else { &tones[..1] } {
         let files = capture(&format!("tones:{tone}"), "0.9", tone);
-        with(&["fuse", "measured.json"], &files, &["-o", "fused.wav", "--force"]);
-        let report = desk.json(&[
-            "measure",
-            "fused.wav",
-            "--tone",
-            tone,
-            "--interleaved",
-            "4",
-            "--skip",
-            "200",
-            "--json",
-        ]);
+        with(&["fuse", "bank.json"], &files, &["-o", "fused.wav", "--force"]);
+        let measure = ["measure", "fused.wav", "--interleaved", "4", "--skip", "200", "--tone", tone];
+        let report = desk.json(&[&measure[..], &["--json"]].concat());
         let sfdr = number(&report, "/sfdr_db");
         println!("{tone}: SFDR {sfdr:.1} dB");
         assert!(sfdr > 95.0, "{tone}: {report}");

@@ -292,34 +292,3 @@ fn runs_warn_of_captures_that_contradict_the_spec() {
     let message = text(&output.stderr);
     assert!(output.status.code() == Some(1) && message.contains("because of --strict"), "{message}");
 }
-
-/// Captures of a complex tone of negative frequency: the delays and gains of the virtual converters, as JSON
-/// says them.
-#[test]
-fn complex_captures_are_calibrated() {
-    let desk = Desk::with_spec(NOMINAL);
-    let errors = ["--delay-error", "10ps,-8ps,9ps,0", "--gain-error", "1%,-0.8%,-1%,0", "--noise", "1e-4"];
-    let simulate = ["simulate", "spec.toml", "--source", "ctones:-37.1MHz", "--samples", "8000", "-o", "cap"];
-    desk.good(&[&simulate[..], &errors[..]].concat());
-    let captures: Vec<String> = (1..=4).map(|i| format!("cap/ch{i}.sigmf-meta")).collect();
-    let calibrate = |tail: &[&'static str]| with(&["calibrate", "spec.toml"], &captures, tail);
-    for tone in ["-37.1MHz", "auto"] {
-        let tail = ["-o", "found.toml", "--reference", "4", "--fit", "delay,gain", "--force", "--tone", tone];
-        let text = desk.good(&calibrate(&tail));
-        assert!(text.contains("-370999"), "{text}");
-        let found =
-            Spec::from_toml(&String::from_utf8(desk.read("found.toml")).unwrap(), "found.toml").unwrap();
-        let table = found.uncertainty.as_ref().unwrap();
-        let half_widths = table.delays(4);
-        for (i, error) in [10e-12, -8e-12, 9e-12].into_iter().enumerate() {
-            let off = found.channels[i].delay.0 - (3 - i) as f64 * 1e-9 - error;
-            // A half-width is 1.96 standard deviations.
-            assert!(off.abs() < 2.5 * half_widths[i].0 && half_widths[i].0 < 1e-13, "{tone} {i}: {off:e}");
-            assert!((found.channels[i].gain - [1.01, 0.992, 0.99][i]).abs() < 3e-5, "{tone} {i}");
-        }
-        assert!(found.channels.iter().all(|channel| channel.offset == 0.0));
-    }
-    let refused = |tail: &[&'static str], parts: &[&str]| desk.refused(1, &calibrate(tail), parts);
-    refused(&["-o", "no.toml", "--tone", "37.1MHz"], &["370999", "minus"]);
-    refused(&["-o", "no.toml", "--blind"], &["4 of 4 captures are complex", "--tone"]);
-}

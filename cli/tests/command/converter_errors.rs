@@ -1,6 +1,6 @@
 //! Errors of virtual converters in `simulate`: noise, jitter, bits, delays, gains, offsets and cut-offs.
 
-use super::simulate::{complex, recording};
+use super::simulate::recording;
 use crate::support::{Desk, THESIS, number, wav};
 use serde_json::Value;
 
@@ -101,25 +101,6 @@ fn errors_of_cut_offs_are_those_of_other_front_ends() {
     );
 }
 
-/// The codes of converters, in words of 16 and 24 bits; the target stays a float.
-#[test]
-fn converters_of_some_bits_write_integers() {
-    let desk = Desk::with_spec(THESIS);
-    for (bits, word) in [("8", 16), ("16", 16), ("17", 24), ("24", 24)] {
-        let args = ["simulate", "spec.toml", "--source", "tones:0.7", "--samples", "300", "-o", "cap"];
-        let floats = [&args[..], &["--to", "sigmf", "--force", "--bits", bits]].concat();
-        desk.good(&floats);
-        let raw = desk.read("cap/ch2.sigmf-data");
-        let raw: Vec<f32> = raw.chunks_exact(4).map(|x| f32::from_le_bytes(x.try_into().unwrap())).collect();
-        desk.good(&[&args[..], &["--force", "--bits", bits]].concat());
-        let (spec, samples) = wav::read(&desk.path("cap/ch2.wav"));
-        assert_eq!((spec.bits_per_sample, spec.sample_format), (word, hound::SampleFormat::Int), "{bits}");
-        assert_eq!(samples, raw, "{bits}");
-        let (target, _) = wav::read(&desk.path("cap/target.wav"));
-        assert_eq!(target.sample_format, hound::SampleFormat::Float);
-    }
-}
-
 #[test]
 fn clipped_samples_are_counted_and_reported() {
     let desk = Desk::with_spec(THESIS);
@@ -162,23 +143,4 @@ fn errors_out_of_range_are_refused_by_name() {
     wav::write(&desk, "fine.wav", 1, 10_000, &[0.5; 1000]);
     let args = ["simulate", "slow.toml", "--source", "fine.wav", "-o", "cap", "--jitter", "1ms"];
     desk.refused(1, &args, &["--jitter: samples may be", "resample the recording"]);
-}
-
-/// I and Q have one clock, hence one jitter, and noise of their own.
-#[test]
-fn an_imaginary_part_has_the_errors_of_its_converters() {
-    let desk = Desk::with_spec(THESIS);
-    let run = |more: &[&str]| {
-        let args =
-            ["simulate", "spec.toml", "--source", "tones:0.3", "--imaginary", "tones:0.3", "-o", "cap"];
-        desk.report(&[&args[..], &["--samples", "4000", "--to", "raw"], more].concat());
-        complex(&desk.read("cap/ch1.cf32"))
-    };
-    assert!(run(&["--jitter", "0.05samples", "--offset", "0.1"]).iter().all(|[re, im]| re == im));
-    let noisy = run(&["--noise", "0.01"]);
-    let apart: f64 = noisy.iter().map(|[re, im]| (re - im).powi(2)).sum::<f64>() / noisy.len() as f64;
-    // 2 sigma^2 with a standard deviation of sqrt(2 / 2000) = 3 %.
-    assert!((apart / 2e-4 - 1.0).abs() < 0.15, "{apart:e}");
-    let both = ["simulate", "spec.toml", "--source", "ctones:1", "--imaginary", "tones:2", "-o", "no"];
-    desk.refused(2, &both, &["--imaginary", "imaginary part of its own"]);
 }

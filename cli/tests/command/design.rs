@@ -95,30 +95,6 @@ fn the_command_line_overrides_the_spec() {
 }
 
 #[test]
-fn the_latency_may_be_left_to_the_designer() {
-    let desk = Desk::with_spec(THESIS);
-    desk.write("open.toml", THESIS.replace("latency = 10\n", ""));
-    let report = desk.json(&["design", "open.toml", "-o", "bank.json", "--json"]);
-    assert_eq!(report["latency_chosen"], true);
-    assert!(number(&report, "/gamma/upper") < 0.04, "{report}");
-    let given = desk.json(&["design", "open.toml", "-o", "b.json", "--latency", "6", "--json"]);
-    assert_eq!((&given["latency"], &given["latency_chosen"]), (&Value::from(6), &Value::from(false)));
-}
-
-#[test]
-fn equal_delays_are_legal() {
-    let desk = Desk::with_spec(THESIS);
-    desk.write("equal.toml", THESIS.replace("delay = 1.2", "delay = 0.6"));
-    for method in ["fir", "iir"] {
-        let taps: &[&str] = if method == "fir" { &["--taps", "22"] } else { &[] };
-        let args = ["design", "equal.toml", "-o", "b.json", "--force", "--json", "--method", method];
-        let report = desk.report(&[&args[..4], &args[6..], taps].concat());
-        let (upper, lower) = (number(&report, "/gamma/upper"), number(&report, "/gamma/lower"));
-        assert!(lower <= upper && upper < 1.01 * lower, "{report}");
-    }
-}
-
-#[test]
 fn banks_flow_through_pipes() {
     let desk = Desk::with_spec(THESIS);
     let designed = desk.run(&["design", "spec.toml", "-o", "-"], &[]);

@@ -118,16 +118,6 @@ fn captures_of_matlab_are_fused() {
     desk.refused(1, &same, &["several.mat"]);
 }
 
-/// Lossy recordings do not keep time: the message names the pipe for those who decode them nonetheless.
-#[test]
-fn lossy_recordings_name_the_pipe() {
-    let desk = Desk::new();
-    desk.write("a.mp3", "ID3");
-    let parts = ["a.mp3", "lossy", "ffmpeg -i a.mp3 -f wav", "| hybank fuse BANK.json -"];
-    desk.refused(1, &["fuse", "bank.json", "a.mp3", "-o", "y.wav"], &parts);
-    desk.refused(1, &["measure", "b.mp3"], &["b.mp3: cannot open it"]);
-}
-
 /// A recording made by ffmpeg (tools/flac_fixture.sh), as a capture that keeps every bit.
 #[test]
 fn flac_recordings_are_captures() {
@@ -248,21 +238,6 @@ fn full_scale_of_tables_is_stated_or_warned_of() {
         let warning = text(&run.stderr);
         assert!(warning.contains(file) && warning.contains(&format!("full scale of {scale}")), "{warning}");
     }
-}
-
-/// Codes around 128 have an offset that no spec can hold; what they look like is said all the same.
-#[test]
-fn values_that_make_no_spec_come_with_the_full_scale_that_explains_them() {
-    let desk = Desk::with_spec(
-        "fast_rate = \"1 MHz\"\nratio = 2\nchannel = [{ delay_samples = 1 }, { delay_samples = 0 }]\n\
-         target = { filter = { family = \"butterworth\", order = 2, cutoff = \"400 kHz\" } }\n",
-    );
-    desk.write("unsigned.dat", codes(128));
-    let run =
-        desk.run(&["calibrate", "spec.toml", "unsigned.dat", "--interleaved", "2", "-o", "m.toml"], &[]);
-    let message = text(&run.stderr);
-    assert!(message.contains("full scale of u8bits") && message.contains("out of range"), "{message}");
-    assert!(!run.status.success() && !desk.path("m.toml").exists());
 }
 
 #[test]

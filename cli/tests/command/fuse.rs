@@ -61,18 +61,6 @@ fn mono_files_line_up_with_their_time_axis() {
 }
 
 #[test]
-fn one_file_of_two_channels_gives_the_same() {
-    let desk = Desk::new();
-    let (a, b) = ramps(1000);
-    wav::write_pair(&desk, &a, &b);
-    let both = interleaved(&a, &b);
-    wav::write(&desk, "both.wav", 2, 24_000, &both);
-    quietly(&desk, &["fuse", "bank.json", "a.wav", "b.wav", "-o", "1.wav"]);
-    quietly(&desk, &["fuse", "bank.json", "both.wav", "-o", "2.wav"]);
-    assert_eq!(desk.read("1.wav"), desk.read("2.wav"));
-}
-
-#[test]
 fn kept_latency_is_the_causal_output() {
     let desk = Desk::new();
     let (a, b) = ramps(100);

@@ -85,22 +85,6 @@ fn a_complex_recording_is_measured() {
     desk.refused(1, &["measure", "x.wav", "--tone", "-4321Hz"], &["-4321", "above 0"]);
 }
 
-#[test]
-fn the_spectrum_is_drawn_with_its_spurs() {
-    let desk = Desk::with_spec(THESIS);
-    wav::write(&desk, "x.wav", 1, 48_000, &capture(20_000, 4321.0));
-    let args = ["measure", "x.wav", "--interleaved", "2", "--plot", "x.svg"];
-    desk.good(&args);
-    let svg = fs::read_to_string(desk.path("x.svg")).unwrap();
-    for part in ["frequency (kHz)", "dBFS", "gain or skew", "offset", "1/2-f", "SINAD"] {
-        assert!(svg.contains(part), "{part}");
-    }
-    desk.refused(1, &args, &["x.svg", "exists", "--force"]);
-    desk.refused(2, &["measure", "x.wav", "--plot", "x.PNG"], &["written as SVG", "name it x.svg"]);
-    desk.refused(2, &["measure", "x.wav", "--plot", "-"], &["--plot -", "file"]);
-    desk.refused(2, &["measure", "x.wav", "--plot", "x.wav", "--force"], &["written as SVG"]);
-}
-
 /// A bank's output against the target of `simulate`, as README says: no lag, and the SNR of the bank also
 /// sample by sample.
 #[test]
@@ -153,28 +137,6 @@ fn a_recording_is_compared_with_a_reference() {
 }
 
 #[test]
-fn channels_ends_and_standard_input() {
-    let desk = Desk::with_spec(THESIS);
-    let tone = capture(6000, 4321.0);
-    let both: Vec<f32> = tone.iter().flat_map(|x| [*x, 0.0]).collect();
-    wav::write(&desk, "both.wav", 2, 48_000, &both);
-    wav::write(&desk, "x.wav", 1, 48_000, &tone);
-    desk.refused(1, &["measure", "both.wav"], &["2 channels", "--channel 1 to 2"]);
-    desk.refused(1, &["measure", "both.wav", "--channel", "3"], &["channel 3", "counted from 1"]);
-    desk.refused(1, &["measure", "both.wav", "--channel", "2"], &["both.wav", "no tone found"]);
-    let mono = desk.json(&["measure", "x.wav", "--json"]);
-    let first = desk.json(&["measure", "both.wav", "--channel", "1", "--json"]);
-    assert_eq!(mono["sinad_db"], first["sinad_db"]);
-    let inner = desk.json(&["measure", "x.wav", "--skip", "500", "--json"]);
-    assert_eq!(inner["samples"], 5000);
-    desk.refused(
-        2,
-        &["measure", "x.wav", "--skip", "3000"],
-        &["--skip: x.wav: 3000 samples", "nothing of 6000"],
-    );
-}
-
-#[test]
 fn clipping_and_hidden_spurs_are_said() {
     let desk = Desk::with_spec(THESIS);
     let loud: Vec<f32> = capture(6000, 4321.0).iter().map(|x| (3.0 * x).clamp(-1.0, 1.0)).collect();
@@ -218,25 +180,6 @@ fn a_reference_has_the_format_of_the_recording() {
         assert!(number(reference, "/error_rms") < most, "{recording} {target}: {reference}");
         assert!((number(reference, "/gain/value") - 1.0).abs() < 1e-4, "{recording} {target}: {reference}");
     }
-}
-
-/// The worst interleaving spur stays in the text, though a fit of it is in the noise.
-#[test]
-fn the_worst_interleaving_spur_is_said_in_the_noise_too() {
-    let desk = Desk::with_spec(THESIS);
-    let mut random = Random(11);
-    let mut noisy = |x: f64| (x + 1e-3 * random.sample()) as f32;
-    let tone: Vec<f32> = (0..20_000).map(|n| noisy(0.5 * (TAU * 0.0901 * f64::from(n)).cos())).collect();
-    wav::write(&desk, "x.wav", 1, 48_000, &tone);
-    let text = desk.good(&["measure", "x.wav", "--interleaved", "2"]);
-    assert!(text.contains("no spur above the noise"), "{text}");
-    let line = text.lines().find(|line| line.starts_with("worst of these")).unwrap();
-    assert!(line.contains("dBc") && line.contains("1/2 fs") && line.ends_with(", below the noise"), "{text}");
-    wav::write(&desk, "y.wav", 1, 48_000, &capture(20_000, 4321.0));
-    let text = desk.good(&["measure", "y.wav", "--interleaved", "2"]);
-    let line = text.lines().find(|line| line.starts_with("worst of these")).unwrap();
-    assert!(line.contains("-30.97 dBc") && line.ends_with("at 24000.000 Hz: offset, 1/2 fs"), "{text}");
-    assert!(!desk.good(&["measure", "y.wav"]).contains("worst of these"));
 }
 
 /// Two channels 0.4 fast samples off their places: plain interleaving has the spurs of that skew, the bank

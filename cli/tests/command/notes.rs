@@ -1,6 +1,6 @@
 //! What recordings say besides their samples, and what of it comes out. As a user runs it.
 
-use crate::support::{Desk, THESIS, bytes, channel, floats, frames, fused, text, wav};
+use crate::support::{Desk, THESIS, bytes, channel, frames, text, wav};
 use serde_json::{Value, json};
 
 /// A recording of one channel: three samples are lost before its sample 40.
@@ -92,25 +92,6 @@ fn sigmf_keeps_what_it_is_for() {
         found.sort();
         assert_eq!(found, want.into_iter().filter(|note| note.0 < samples).collect::<Vec<_>>());
     }
-}
-
-#[test]
-fn a_recording_without_a_rate_is_noted_and_an_archive_is_to_be_extracted() {
-    let desk = Desk::new();
-    let input = frames(200);
-    let meta =
-        r#"{ "global": { "core:datatype": "rf32_le", "core:num_channels": 2, "core:version": "1.0.0" } }"#;
-    desk.write("both.sigmf-meta", meta);
-    desk.write("both.sigmf-data", bytes(&input));
-    let output = desk.run(&["stream", "bank.json", "--input", "both.sigmf-meta"], &[]);
-    assert!(output.status.success() && floats(&output.stdout) == fused(&input), "{output:?}");
-    let message = text(&output.stderr);
-    assert!(message.contains("states no core:sample_rate") && message.lines().count() == 1, "{message}");
-    let strict = ["fuse", "bank.json", "both.sigmf-meta", "-o", "no.wav", "--strict"];
-    desk.refused(1, &strict, &["both.sigmf-meta", "core:sample_rate", "--strict"]);
-    desk.write("both.sigmf", "both.sigmf-meta".repeat(100));
-    let archive = ["fuse", "bank.json", "both.sigmf", "-o", "no.wav"];
-    desk.refused(1, &archive, &["both.sigmf", "an archive", "tar -xf"]);
 }
 
 /// A chunk with its pad byte.

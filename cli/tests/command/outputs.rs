@@ -3,7 +3,7 @@
 use crate::support::{Desk, bytes, channel, frames, fused, names, text};
 use std::fs;
 use std::io::Write;
-use std::os::unix::fs::{PermissionsExt, symlink};
+use std::os::unix::fs::symlink;
 use std::process::{Child, Command};
 
 /// A desk with the recordings a.wav and b.wav of two channels.
@@ -96,25 +96,6 @@ fn output_and_mask_are_two_files() {
     desk.refused(2, &fuse("out.wav", "-"), &["--mask -", "standard output"]);
 }
 
-#[test]
-fn links_are_followed_and_permissions_kept() {
-    let desk = desk();
-    desk.write("real.wav", "old");
-    fs::set_permissions(desk.path("real.wav"), fs::Permissions::from_mode(0o600)).unwrap();
-    symlink("real.wav", desk.path("link.wav")).unwrap();
-    symlink("nothing", desk.path("dangling.wav")).unwrap();
-    symlink("/dev/stdout", desk.path("stdout.wav")).unwrap();
-    let fuse = |output| ["fuse", "bank.json", "a.wav", "b.wav", "--force", "-o", output];
-    let output = desk.run(&fuse("link.wav"), &[]);
-    assert!(output.status.success(), "{output:?}");
-    assert!(desk.path("link.wav").symlink_metadata().unwrap().is_symlink());
-    let mode = desk.path("real.wav").metadata().unwrap().permissions().mode();
-    assert_eq!((&desk.read("real.wav")[..4], mode & 0o777), (&b"RIFF"[..], 0o600));
-    desk.refused(1, &fuse("dangling.wav"), &["dangling.wav", "link to nothing"]);
-    desk.refused(1, &fuse("stdout.wav"), &["stdout.wav", "redirect"]);
-    assert!(desk.path("stdout.wav").symlink_metadata().unwrap().is_symlink());
-}
-
 /// What a live run could not give its names is whole, and named by the message; removes it.
 fn remain(desk: &Desk, message: &str, count: usize) {
     let (_, files) = message.trim_end().split_once("; what was recorded is in ").expect(message);
@@ -122,20 +103,6 @@ fn remain(desk: &Desk, message: &str, count: usize) {
     assert_eq!(files.len(), count, "{message}");
     assert_eq!(desk.read(files[0]), bytes(&fused(&frames(10))));
     files.iter().for_each(|file| fs::remove_file(desk.path(file)).unwrap());
-}
-
-#[test]
-fn of_two_runs_at_once_the_later_one_replaces_nothing() {
-    let desk = Desk::new();
-    let first = waiting(&desk, &["-o", "out"], 1);
-    let second = waiting(&desk, &["-o", "out"], 2);
-    assert_eq!(end(first), (Some(0), String::new()));
-    let before = desk.read("out");
-    let (code, message) = end(second);
-    assert!(code == Some(1) && message.contains("out: the file exists"), "{message}");
-    assert_eq!((message.lines().count(), desk.read("out")), (1, before));
-    remain(&desk, &message, 1);
-    assert_eq!(names(&desk.path("")), ["bank.json", "out"]);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Converters with rates of their own, from the spec to the fused recording, as a user runs it.
 
 use crate::support::{Desk, text, wav};
+use serde_json::Value;
 
 /// 24 kHz and 16 kHz into 48 kHz; frames of 6 samples from 3 and 2.
 const SPEC: &str = r#"
@@ -30,6 +31,8 @@ taps = 72
 noise = 3e-4
 "#;
 const SOURCE: &str = "tones:0.9kHz,4.3kHz,8.9kHz,12.1kHz";
+const CAPTURES: [&str; 2] = ["cap/ch1.wav", "cap/ch2.wav"];
+const DIRECT: [&str; 2] = ["--algorithm", "direct"];
 const WAIT: usize = 4;
 
 fn desk() -> Desk {
@@ -43,6 +46,11 @@ fn captured(desk: &Desk, more: &[&str]) {
     let args =
         ["simulate", "spec.toml", "--source", SOURCE, "--gain", "0.2", "-o", "cap", "--force", "--json"];
     desk.good(&[&args[..], more].concat());
+}
+
+/// Fuses two recordings; the report.
+fn fused(desk: &Desk, [first, second]: [&str; 2], output: &str, more: &[&str]) -> Value {
+    desk.report(&[&["fuse", "bank.json", first, second, "-o", output], more].concat())
 }
 
 fn level(samples: &[f32]) -> f64 {
@@ -80,24 +88,14 @@ fn the_promised_snr_is_measured() {
 fn streams_have_the_bits_of_files() {
     let desk = desk();
     captured(&desk, &["--samples", "3000"]);
-    desk.report(&[
-        "fuse",
-        "bank.json",
-        "cap/ch1.wav",
-        "cap/ch2.wav",
-        "-o",
-        "late.wav",
-        "--keep-latency",
-        "--algorithm",
-        "direct",
-    ]);
-    let fused = wav::samples(&desk, "late.wav");
-    let [a, b] = ["cap/ch1.wav", "cap/ch2.wav"].map(|name| wav::samples(&desk, name));
+    fused(&desk, CAPTURES, "late.wav", &["--keep-latency", "--algorithm", "direct"]);
+    let late = wav::samples(&desk, "late.wav");
+    let [a, b] = CAPTURES.map(|name| wav::samples(&desk, name));
     let bytes = |samples: &[f32]| samples.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
     let frames: Vec<f32> = a.chunks(3).zip(b.chunks(2)).flat_map(|(a, b)| [a, b].concat()).collect();
     let streamed = desk.run(&["stream", "bank.json", "--format", "f32le"], &bytes(&frames));
     assert!(streamed.status.success(), "{streamed:?}");
-    assert_eq!(streamed.stdout, bytes(&fused[..streamed.stdout.len() / 4]));
+    assert_eq!(streamed.stdout, bytes(&late[..streamed.stdout.len() / 4]));
     assert_eq!(streamed.stdout.len() / 4, a.len() * 2);
     desk.write("a.raw", bytes(&a));
     desk.write("b.raw", bytes(&b));
@@ -105,30 +103,13 @@ fn streams_have_the_bits_of_files() {
     assert_eq!(desk.run(&inputs, &[]).stdout, streamed.stdout);
     // One file of whole frames.
     wav::write(&desk, "frames.wav", 5, 8000, &frames);
-    desk.report(&[
-        "fuse",
-        "bank.json",
-        "frames.wav",
-        "-o",
-        "again.wav",
-        "--keep-latency",
-        "--algorithm",
-        "direct",
-    ]);
-    assert_eq!(wav::samples(&desk, "again.wav"), fused);
+    let again = ["fuse", "bank.json", "frames.wav", "-o", "again.wav", "--keep-latency"];
+    desk.report(&[&again[..], &DIRECT].concat());
+    assert_eq!(wav::samples(&desk, "again.wav"), late);
     // The output of `fuse` lies on the time axis of the converters: the wait is no part of what is dropped.
-    let report = desk.report(&[
-        "fuse",
-        "bank.json",
-        "cap/ch1.wav",
-        "cap/ch2.wav",
-        "-o",
-        "fused.wav",
-        "--algorithm",
-        "direct",
-    ]);
+    let report = fused(&desk, CAPTURES, "fused.wav", &DIRECT);
     assert_eq!(report["latency_dropped"], 22 - WAIT);
-    assert_eq!(wav::samples(&desk, "fused.wav")[..2900], fused[22 - WAIT..][..2900]);
+    assert_eq!(wav::samples(&desk, "fused.wav")[..2900], late[22 - WAIT..][..2900]);
 }
 
 /// The shortest recording counts, in whole frames.
@@ -136,7 +117,7 @@ fn streams_have_the_bits_of_files() {
 fn recordings_of_unequal_length_are_cut_to_whole_frames() {
     let desk = desk();
     captured(&desk, &["--samples", "3000"]);
-    let [a, b] = ["cap/ch1.wav", "cap/ch2.wav"].map(|name| wav::samples(&desk, name));
+    let [a, b] = CAPTURES.map(|name| wav::samples(&desk, name));
     wav::write(&desk, "a.wav", 1, 24_000, &a[..1000]);
     wav::write(&desk, "b.wav", 1, 16_000, &b[..601]);
     let output = desk.run(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav"], &[]);
@@ -148,8 +129,7 @@ fn recordings_of_unequal_length_are_cut_to_whole_frames() {
         "{message}"
     );
     assert_eq!(wav::samples(&desk, "out.wav").len(), 300 * 6);
-    let longest =
-        desk.report(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "long.wav", "--longest", "--gaps"]);
+    let longest = fused(&desk, ["a.wav", "b.wav"], "long.wav", &["--longest", "--gaps"]);
     assert_eq!(longest["samples"], 334 * 6);
     // 334 frames need 1002 and 668 samples.
     assert_eq!(longest["gaps"]["missing"], 2 + 67, "{longest}");
@@ -160,7 +140,7 @@ fn recordings_of_unequal_length_are_cut_to_whole_frames() {
 fn lost_samples_count_for_their_converter() {
     let desk = desk();
     captured(&desk, &["--samples", "6000"]);
-    let [a, b] = ["cap/ch1.wav", "cap/ch2.wav"].map(|name| wav::samples(&desk, name));
+    let [a, b] = CAPTURES.map(|name| wav::samples(&desk, name));
     let (mut nan, mut left_out) = (a.clone(), a.clone());
     nan[100..107].fill(f32::NAN);
     left_out.drain(100..107);
@@ -171,19 +151,7 @@ fn lost_samples_count_for_their_converter() {
     desk.write("lost.jsonl", lines);
     desk.write("invalid.jsonl", lines.lines().last().unwrap());
     let fuse = |a: &str, lost: &str, output: &str| {
-        desk.report(&[
-            "fuse",
-            "bank.json",
-            a,
-            "b.wav",
-            "--lost",
-            lost,
-            "--gaps",
-            "-o",
-            output,
-            "--mask",
-            "mask",
-        ])
+        fused(&desk, [a, "b.wav"], output, &["--lost", lost, "--gaps", "--mask", "mask"])
     };
     let marked = fuse("nan.wav", "invalid.jsonl", "one.wav");
     let mask = desk.read("mask");
@@ -200,7 +168,7 @@ fn lost_samples_count_for_their_converter() {
     assert_eq!(one[..5900], two[..5900]);
     // What no lost sample touches is as if none had been lost.
     wav::write(&desk, "a.wav", 1, 24_000, &a);
-    desk.report(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "whole.wav", "--algorithm", "direct"]);
+    fused(&desk, ["a.wav", "b.wav"], "whole.wav", &DIRECT);
     let whole = wav::samples(&desk, "whole.wav");
     let differs: Vec<usize> = (0..5900).filter(|&n| one[n] != whole[n]).collect();
     assert!(!differs.is_empty() && differs.iter().all(|&n| mask[n] > 0));
@@ -233,28 +201,11 @@ fn converters_of_unequal_rates_are_calibrated_by_tones() {
     let desk = Desk::with_spec(SPEC);
     let errors =
         ["--delay-error", "0,0.05samples", "--gain-error", "0,2%", "--noise", "1e-4", "--samples", "96000"];
-    let args = [
-        "simulate",
-        "spec.toml",
-        "--source",
-        "tones:1.1kHz,2.3kHz,9.7kHz",
-        "--gain",
-        "0.2",
-        "-o",
-        "cap",
-        "--json",
-    ];
-    desk.good(&[&args[..], &errors[..]].concat());
-    let report = desk.report(&[
-        "calibrate",
-        "spec.toml",
-        "cap/ch1.wav",
-        "cap/ch2.wav",
-        "--tone",
-        "1.1kHz,2.3kHz,9.7kHz",
-        "-o",
-        "measured.toml",
-    ]);
+    let source = "tones:1.1kHz,2.3kHz,9.7kHz";
+    let simulate = ["simulate", "spec.toml", "--source", source, "--gain", "0.2", "-o", "cap", "--json"];
+    desk.good(&[&simulate[..], &errors[..]].concat());
+    let calibrate = ["calibrate", "spec.toml", "cap/ch1.wav", "cap/ch2.wav", "-o", "measured.toml"];
+    let report = desk.report(&[&calibrate[..], &["--tone", "1.1kHz,2.3kHz,9.7kHz"]].concat());
     let channels = report["channels"].as_array().unwrap();
     assert_eq!(channels.len(), 2, "{report}");
     let near = |key: &str, want: f64, most: f64| {

@@ -71,31 +71,6 @@ fn captures_are_shown_before_and_after() {
     assert!(!desk.path("other.html").exists());
 }
 
-/// Codes in a table, as `fuse` takes them; the page says how.
-#[test]
-fn captures_in_turn_and_in_tables_are_shown() {
-    let desk = desk();
-    let code = |n: usize| format!("{}\n", (100.0 * (0.3 * n as f64).cos()).round());
-    desk.write("z.txt", (0..4000).map(code).collect::<String>());
-    let page = page(&desk, &["z.txt", "--interleaved", "2", "--sample-bits", "8"]);
-    assert!(page.contains("hybank fuse b.json z.txt --full-scale 8bits --interleaved 2 -o fused.wav"));
-    // 100 of 128 is full scale.
-    assert!(page.contains("-2.1") && page.contains("SINAD"));
-    let two = ["report", "b.json", "z.txt", "z.txt", "--interleaved", "2", "-o", "x.html"];
-    desk.refused(2, &two, &["--interleaved 2", "2 inputs"]);
-}
-
-/// Offsets are in the table of the channels. Captures of other signals than a tone have no figures.
-#[test]
-fn offsets_are_shown_and_captures_without_a_tone() {
-    let desk = Desk::with_spec(&THESIS.replace("delay = 0.6", "delay = 0.6\noffset = 0.0125"));
-    desk.good(&["design", "spec.toml", "-o", "b.json"]);
-    desk.good(&["simulate", "b.json", "--source", "step@100", "--samples", "4000", "-o", "cap"]);
-    let page = page(&desk, &["cap/ch1.wav", "cap/ch2.wav"]);
-    assert!(page.contains("<th>offset</th>") && page.contains("<td class=\"value\">0.0125</td>"));
-    assert!(page.contains("No tone was measured") && !page.contains("SINAD"));
-}
-
 /// The first 2^20 frames are on the page, which the warning and the caption say.
 #[test]
 fn long_captures_are_cut_with_a_warning() {
@@ -110,14 +85,6 @@ fn long_captures_are_cut_with_a_warning() {
     assert!(message.contains("long.wav: only the first 1048576 frames are on the page"), "{message}");
     let page = String::from_utf8(desk.read("r.html")).unwrap();
     assert!(page.contains("the first 1048576 frames of the captures"));
-}
-
-#[test]
-fn captures_that_are_too_short_are_named() {
-    let desk = desk();
-    desk.good(&["simulate", "b.json", "--source", "tones:0.3", "--samples", "12", "-o", "cap"]);
-    let args = ["report", "b.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "r.html"];
-    desk.refused(1, &args, &["cap/ch1.wav, cap/ch2.wav: 6 frames", "needs 16", "longer captures"]);
 }
 
 #[test]

@@ -196,7 +196,7 @@ fn one_channel_of_a_recording_is_a_source() {
 
 /// Two captures of a speech recording with the wanted signal, made elsewhere in the frequency domain.
 /// Complex numbers of little-endian 32-bit floats.
-pub(crate) fn complex(bytes: &[u8]) -> Vec<[f64; 2]> {
+fn complex(bytes: &[u8]) -> Vec<[f64; 2]> {
     let number = |bytes: &[u8]| f64::from(f32::from_le_bytes(bytes.try_into().unwrap()));
     bytes.chunks_exact(8).map(|sample| [number(&sample[..4]), number(&sample[4..])]).collect()
 }
@@ -252,6 +252,7 @@ fn captures_at_gigahertz_are_sigmf_recordings() {
     assert_eq!(desk.read_json("cap/ch1.sigmf-meta")["global"]["core:datatype"], "rf32_le");
 }
 
+/// Two captures of a speech recording with the wanted signal, made elsewhere in the frequency domain.
 #[test]
 fn captures_made_elsewhere_are_fused() {
     let (Some(captures), Some(speech)) =

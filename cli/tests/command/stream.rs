@@ -258,17 +258,6 @@ fn a_recording_whose_name_is_taken_stays_under_its_hidden_name() {
 }
 
 #[test]
-fn a_name_that_is_too_long_is_refused_before_the_first_sample() {
-    let bench = Bench::new();
-    let name = "x".repeat(256);
-    let output = bench.run(&["-o", &name], &bytes(&frames(3)));
-    assert_eq!(output.status.code(), Some(1), "{output:?}");
-    let message = text(&output.stderr);
-    assert!(message.contains("cannot create it: File name too long"), "{message}");
-    assert!(bench.unfinished_bytes().is_none());
-}
-
-#[test]
 fn a_closed_pipe_ends_quietly() {
     let bench = Bench::new();
     let mut child = bench.spawn(&[]);
@@ -322,7 +311,8 @@ fn inputs_have_several_channels_each() {
     let head =
         "fast_period = 1.0\nratio = 4\nlatency = 8\n[target]\nfilter = { num = [1.0], den = [1.0, 1.0] }\n";
     desk.write("spec.toml", format!("{head}[design]\nmethod = \"fir\"\ntaps = 16\n{channels}"));
-    desk.good(&["design", "spec.toml", "-o", "b.json"]);
+    crate::calibrate::design(&desk, "spec.toml");
+    std::fs::rename(desk.path("bank.json"), desk.path("b.json")).unwrap();
     let samples: Vec<f32> = (0..400).map(|n| ((n * n * 7) % 101) as f32 / 101.0 - 0.5).collect();
     let pair = |from: usize| -> Vec<f32> { samples.chunks(4).flat_map(|x| [x[from], x[from + 1]]).collect() };
     desk.write("left.raw", bytes(&pair(0)));

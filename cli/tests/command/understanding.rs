@@ -26,32 +26,6 @@ fn designed(desk: &Desk, spec: &str, flags: &[&str]) -> (Option<i32>, String) {
     (output.status.code(), text(&output.stderr))
 }
 
-#[test]
-fn units_in_a_spec_are_those_of_bare_numbers() {
-    let desk = Desk::with_spec(AUDIO);
-    desk.good(&["design", "spec.toml", "-o", "bare.json"]);
-    let with_units = AUDIO
-        .replace("48000.0", "\"48 kS/s\"")
-        .replace("9000.0", "\"9 kHz\"")
-        .replace("25e-6", "\"25us\"")
-        .replace("12.5e-6", "\"12.5 us\"");
-    desk.write("units.toml", &with_units);
-    desk.good(&["design", "units.toml", "-o", "units.json"]);
-    assert!(desk.read("bare.json") == desk.read("units.json"), "the banks differ");
-    for (unit, parts) in [
-        ("\"9 kHz \"", &[][..]),
-        ("\"9 ks\"", &["target.filter.cutoff", "unit \"ks\"", "9kHz"]),
-        ("\"nine\"", &["target.filter.cutoff", "does not begin with a number"]),
-        ("true", &["target.filter.cutoff", "a number and its unit"]),
-    ] {
-        desk.write("odd.toml", AUDIO.replace("9000.0", unit));
-        let args = ["design", "odd.toml", "-o", "odd.json", "--force"];
-        if parts.is_empty() { drop(desk.good(&args)) } else { drop(desk.refused(1, &args, parts)) }
-    }
-    desk.write("odd.toml", AUDIO.replace("fast_rate = 48000.0", "fast_period = \"1 samples\""));
-    desk.refused(1, &["design", "odd.toml", "-o", "odd.json", "--force"], &["fast_period", "\"1 ns\""]);
-}
-
 /// Each of these once gave exit code 0 and a proud report.
 #[test]
 fn slips_are_warned_of_and_refused_with_strict() {
@@ -140,17 +114,6 @@ fn names_of_outputs_say_what_is_in_them() {
     }
     let wav = ["stream", "b.json", "--format", "wav", "-o", "out.raw"];
     desk.refused(2, &wav, &["out.raw: the output is WAV, not raw"]);
-}
-
-#[test]
-fn tones_without_a_unit_are_warned_of() {
-    let desk = Desk::with_spec(AUDIO);
-    let warned = |source: &str, folder: &str| {
-        let output = desk.run(&["simulate", "spec.toml", "--source", source, "-o", folder], &[]);
-        assert!(output.status.success(), "{output:?}");
-        text(&output.stderr).contains("rad/s; write tones:440Hz")
-    };
-    assert!(warned("tones:440", "a") && !warned("tones:440 Hz", "b"));
 }
 
 #[test]

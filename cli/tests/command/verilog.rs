@@ -277,30 +277,3 @@ fn a_small_circuit_is_proven() {
         assert!(is_good, "{flags}: {said}");
     }
 }
-
-/// Without a title, with one channel and one phase, and with fewer bits or clocks than one may think.
-#[test]
-fn the_header_and_the_warnings_say_what_the_circuit_does() {
-    let desk = Desk::empty();
-    desk.write("b.json", bank_of_integers(vec![vec![3, -1]], 4, 0, 1).to_json().unwrap());
-    let export = ["export", "b.json", "-o", "core.v", "--force", "--input-bits", "8"];
-    let header = |flags: &[&str]| {
-        let output = desk.run(&[&export[..], flags].concat(), &[]);
-        assert!(output.status.success(), "{output:?}");
-        let head = String::from_utf8(desk.read("core.v")).unwrap();
-        (head.split("*/").next().unwrap().to_owned(), text(&output.stderr))
-    };
-    let (plain, said) = header(&[]);
-    let parts =
-        ["the sample x1 of 8 bits, one of the channel", "the output y0 of 8 bits", "a width of 10 holds all"];
-    assert!(parts.iter().all(|part| plain.contains(part)) && said.is_empty(), "{plain} {said}");
-    let (narrow, said) = header(&["--accumulator", "4"]);
-    assert!(narrow.contains("accumulator of 4 bits wraps around; 10 would hold all sums"), "{narrow}");
-    assert!(
-        said.contains("warning: sums wrap around in the accumulator of 4 bits; 10 would hold all"),
-        "{said}"
-    );
-    let (folded, said) = header(&["--clocks-per-frame", "100"]);
-    assert!(folded.contains("every\n   2 clocks, when in_ready is there"), "{folded}");
-    assert!(said.contains("warning: no more than 2 clocks have work in a frame"), "{said}");
-}

@@ -157,8 +157,7 @@ impl<'a> Fusion<'a> {
         let Some(gaps) = self.gaps.take() else { return Ok(0) };
         let filled = |part| Interleaved::new(gaps.filled(part), self.offsets.len());
         let filled: Result<Vec<_>, _> = (0..self.parts()).map(filled).collect();
-        let written =
-            filled.map_err(ProcessError::from).and_then(|parts| self.filter(&parts, frames, most, output));
+        let written = filled.and_then(|parts| self.filter(&parts, frames, most, output));
         self.gaps = Some(gaps);
         written
     }

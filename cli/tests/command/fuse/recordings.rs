@@ -26,28 +26,6 @@ fn integers_saturate_and_the_count_is_reported() {
 }
 
 #[test]
-fn every_width_is_what_it_says() {
-    let desk = Desk::new();
-    scale_bank(&desk, 1.0, 1.0 / 1024.0);
-    wav::write_pair(&desk, &[1.0, -0.5, 0.25], &[0.0; 3]);
-    let args = |bits| ["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--force", "--bits", bits];
-    for (bits, width, format) in [
-        ("16", 16, hound::SampleFormat::Int),
-        ("24", 24, hound::SampleFormat::Int),
-        ("32", 32, hound::SampleFormat::Int),
-        ("32f", 32, hound::SampleFormat::Float),
-    ] {
-        quietly(&desk, &args(bits));
-        let spec = hound::WavReader::open(desk.path("out.wav")).unwrap().spec();
-        assert_eq!((spec.bits_per_sample, spec.sample_format), (width, format));
-    }
-    quietly(&desk, &args("64f"));
-    let bytes = desk.read("out.wav");
-    assert_eq!(bytes[bytes.len() - 48..][..8], (3.0f64 / 1024.0).to_le_bytes());
-    desk.refused(2, &args("12"), &["12", "16, 24, 32, 32f, 64f"]);
-}
-
-#[test]
 fn unequal_lengths_are_reported_and_strict_refuses_them() {
     let desk = Desk::new();
     let (a, b) = ramps(50_000);

@@ -1,6 +1,6 @@
 //! One file or pipe in which converters take turns.
 
-use crate::support::{Desk, bytes, interleaved, wav};
+use crate::support::{Desk, bytes, wav};
 use serde_json::json;
 
 /// A bank of three converters with the delays 0, 2 and 1 of a slow period of 3, whose channels go unchanged
@@ -47,21 +47,6 @@ fn the_converter_that_samples_first_comes_first() {
         assert_eq!(spec.sample_rate, 48_000);
         assert!(fused == by_channel(turns), "{turns} turns");
     }
-}
-
-#[test]
-fn one_file_gives_the_bytes_of_a_file_per_channel() {
-    let desk = Desk::new();
-    let (a, b) = (
-        (0..30_000).map(|k| ((k * 31) % 97) as f32 / 97.0).collect::<Vec<f32>>(),
-        (0..30_000).map(|k| ((k * 17) % 89) as f32 / 89.0).collect::<Vec<f32>>(),
-    );
-    wav::write_pair(&desk, &a, &b);
-    wav::write(&desk, "capture.wav", 1, 48_000, &interleaved(&a, &b));
-    desk.good(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "1.wav"]);
-    // Equal delays: the channels take turns in their order.
-    desk.good(&["fuse", "bank.json", "capture.wav", "-o", "2.wav", "--interleaved", "2"]);
-    assert!(desk.read("1.wav") == desk.read("2.wav"));
 }
 
 #[test]

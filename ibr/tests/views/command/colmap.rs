@@ -2,7 +2,7 @@
 
 use super::*;
 use hybank_ibr::camera::colmap::parse_model;
-use hybank_ibr::image::{Image, MOST_PIXELS, read_image};
+use hybank_ibr::image::Image;
 
 /// Columns of the three cameras, along x.
 const PLACES: [f64; 3] = [-0.2, 0.2, 0.0];
@@ -120,30 +120,6 @@ fn binary_models_and_their_depth_maps_are_rendered() {
     );
 }
 
-/// The folders of an image tell which of two cameras with one file name is its own.
-#[test]
-fn folders_tell_images_of_one_name_apart() {
-    let dir = folder(["left/0001.png", "right/0001.png", "mid/0001.png"]);
-    let found = psnr(dir.path(), &["--view", "mid/0001.png", "--truth", "photos/mid/0001.png"]);
-    assert!(found > 31.0, "{found}");
-    std::fs::copy(dir.path().join("photos/right/0001.png"), dir.path().join("0001.png")).unwrap();
-    let render = ["render", "s.toml", "--view", "mid/0001.png", "-o", "x.png"];
-    replace(dir.path(), "photos/right/0001.png", "0001.png");
-    refused(
-        dir.path(),
-        &render,
-        1,
-        &["view \"0001.png\"", "left/0001.png or mid/0001.png or right/0001.png", "folders"],
-    );
-    // A model that has the left image only does not lend its camera to the right one.
-    replace(dir.path(), "\"0001.png\"", "\"photos/right/0001.png\"");
-    let one = images(["left/0001.png", "other.png", "mid.png"]);
-    std::fs::write(dir.path().join("model/images.txt"), one).unwrap();
-    let both = ["photos/left/0001.png", "photos/right/0001.png", "both"];
-    refused(dir.path(), &render, 1, &both);
-    refused(dir.path(), &["render", "s.toml", "--view", "right/0001.png", "-o", "x.png"], 1, &both);
-}
-
 /// Photographs of half the size that the model is for: the cameras are scaled with them.
 #[test]
 fn cameras_are_scaled_to_their_photographs() {
@@ -180,32 +156,4 @@ fn cameras_are_scaled_to_their_photographs() {
     std::fs::write(at("model/cameras.txt"), cameras((45, 60), inner)).unwrap();
     let render = ["render", "s.toml", "--view", "c.png", "-o", "x.png"];
     refused(dir.path(), &render, 1, &["view \"photos/a.png\"", "60 x 45", "45 x 60", "same factor"]);
-}
-
-/// A virtual view of another size but of the shape of its camera's image shows the same scene; one of
-/// another shape is a window of it.
-#[test]
-fn a_size_of_the_same_shape_scales_the_virtual_camera() {
-    let dir = folder(FLAT);
-    let at = |name: &str| dir.path().join(name);
-    let small = photographs((60, 45), INNER.map(|v| v / 2.0));
-    save(&small[2].0, &at("small.png")).unwrap();
-    let whole = std::fs::read_to_string(at("s.toml")).unwrap();
-    let two = whole.split("[[view]]").take(3).collect::<Vec<_>>().join("[[view]]");
-    let target = |size: &str| {
-        let text = format!("{two}[virtual]\ncamera_of = \"c.png\"\n{size}");
-        std::fs::write(at("s.toml"), text).unwrap();
-    };
-    target("size = [60, 45]\n");
-    let found = psnr(dir.path(), &["--truth", "small.png"]);
-    assert!(found > 28.0, "{found}");
-    let picture = |name: &str| read_image(&at(name), MOST_PIXELS).unwrap();
-    target("");
-    good(dir.path(), &["render", "s.toml", "-o", "whole.png"]);
-    target("size = [120, 50]\n");
-    good(dir.path(), &["render", "s.toml", "-o", "window.png"]);
-    let (whole, window) = (picture("whole.png"), picture("window.png"));
-    let difference = |i: usize| (whole.data()[i] - window.data()[i]).abs();
-    // The fit at the lower border of the window knows nothing of what is below.
-    assert!((0..3 * 120 * 45).all(|i| difference(i) <= 2.0));
 }

@@ -117,30 +117,6 @@ fn alpha_counts_and_errors_are_written() {
     }
 }
 
-/// Of four views the two beside the virtual camera are used, and the result is nearly that of these alone.
-#[test]
-fn the_nearest_views_are_enough() {
-    let dir = rig();
-    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
-    let far = |name: &str, image: &str, position: f64| {
-        format!(
-            "[[view]]\nname = \"{name}\"\nimage = \"{image}.png\"\nposition = {position:?}\ndisparity = \"{image}.pfm\"\n"
-        )
-    };
-    let four = far("far left", "left", -3.0) + &far("far right", "right", 4.0) + &scene;
-    std::fs::write(dir.path().join("four.toml"), four).unwrap();
-    let psnr = |scene: &str, more: &[&str]| {
-        let arguments = ["render", scene, "-o", "o.png", "--force", "--json", "--truth", "middle.png"];
-        let figures = json(&run(dir.path(), &[&arguments[..], more].concat()));
-        (figures["psnr"].as_f64().unwrap(), figures["views"].clone())
-    };
-    let (two, views) = psnr("four.toml", &["--nearest", "2"]);
-    assert_eq!(views, serde_json::json!([2, 3]));
-    let (alone, _) = psnr("scene.toml", &[]);
-    let (all, _) = psnr("four.toml", &[]);
-    assert!((two - alone).abs() < 0.01 && all < two - 3.0, "{two} {alone} {all}");
-}
-
 /// The pose of a turned camera as OpenGL writes it: x right, y up, z backwards, to the world.
 fn open_gl(turn: [f64; 3], centre: [f64; 3]) -> serde_json::Value {
     let r = Rotation3::from_euler_angles(turn[0], turn[1], turn[2]).inverse();
@@ -208,15 +184,4 @@ fn transforms_files_give_the_views() {
     }
     write(&without);
     refused(dir.path(), &["render", "s.toml", "-o", "x.png"], 1, &["frame 1", "depth_file_path", "[[view]]"]);
-}
-
-/// A view alone cannot contradict another: the report says that its inputs are unchecked.
-#[test]
-fn the_inputs_of_a_single_view_are_reported_as_unchecked() {
-    let dir = rig();
-    let text = |arguments: &[&str]| String::from_utf8(good(dir.path(), arguments).stdout).unwrap();
-    let both = text(&["render", "scene.toml", "-o", "both.png"]);
-    assert!(both.contains("inputs    views agree in depth and colour at "), "{both}");
-    let alone = text(&["render", "scene.toml", "--view", "right", "-o", "alone.png"]);
-    assert!(alone.contains("inputs    unchecked: a single view"), "{alone}");
 }

@@ -90,27 +90,3 @@ fn foreign_text_in_files_is_quoted_and_bounded() {
         check(&scene.replacen("left.png", "bad.png", 1), "png");
     }
 }
-
-#[test]
-fn foreign_names_and_arguments_are_quoted_and_bounded() {
-    let dir = rig();
-    let long = "y".repeat(50_000);
-    for text in [HOSTILE, &long] {
-        for arguments in [
-            &["render", text, "-o", "o.png"][..],
-            &["render", "scene.toml", "-o", text],
-            &["render", "scene.toml", "-o", &format!("{text}.png")],
-            &["render", "scene.toml", "-o", "o.png", "--view", text],
-            &["render", "scene.toml", "-o", "o.png", "--truth", text],
-            &["render", "scene.toml", "-o", "o.png", "--lambda", text],
-            &["render", "scene.toml", "-o", "o.png", &format!("--{text}")],
-            &["bound", text],
-            &["demo", "--size", text],
-            &["demo", "--size", &format!("{text}x9")],
-            &[text],
-        ] {
-            let what = format!("{:?}", &arguments[..arguments.len() - 1]);
-            assert!(!said(dir.path(), arguments, &what).is_empty() || text == HOSTILE, "{what}");
-        }
-    }
-}

@@ -94,35 +94,6 @@ fn warnings_are_about_all_views_of_a_path() {
     assert_eq!(message.matches("agree in depth and colour at only").count(), 1, "{message}");
 }
 
-/// A view is named as the shell completes its file, and by its file name where that is enough.
-#[test]
-fn views_are_found_by_the_end_of_their_path() {
-    let dir = rig();
-    let at = |name: &str| dir.path().join(name);
-    std::fs::create_dir(at("photos")).unwrap();
-    ["left", "right"].iter().for_each(|name| {
-        std::fs::rename(at(&format!("{name}.png")), at(&format!("photos/{name}.png"))).unwrap();
-    });
-    let text = scene(dir.path()).replace("image = \"", "image = \"./photos/");
-    let nameless = text.replace("name = \"left\"\n", "").replace("name = \"right\"\n", "");
-    write(dir.path(), "named.toml", &text);
-    write(dir.path(), "nameless.toml", &nameless);
-    good(dir.path(), &["render", "named.toml", "--view", "left", "-o", "want.png"]);
-    let want = std::fs::read(at("want.png")).unwrap();
-    for (scene, name) in [
-        ("named.toml", "photos/left.png"),
-        ("nameless.toml", "photos/left.png"),
-        ("nameless.toml", "left.png"),
-        ("nameless.toml", "./photos/left.png"),
-    ] {
-        good(dir.path(), &["render", scene, "--view", name, "-o", "got.png", "--force"]);
-        assert!(std::fs::read(at("got.png")).unwrap() == want, "{scene} {name}");
-    }
-    // Another folder is another view.
-    let other = ["render", "nameless.toml", "--view", "other/left.png", "-o", "x.png"];
-    refused(dir.path(), &other, 1, &["no view", "./photos/left.png, ./photos/right.png"]);
-}
-
 /// Two frames of a transforms file with depth in hundredths of a unit, a third one without.
 fn transforms() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();

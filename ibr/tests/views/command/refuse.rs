@@ -91,8 +91,6 @@ fn hostile_arguments_are_refused_by_name() {
     json(&render(&["-o", "flat.png", "--depth-step", "100000", "--json"]));
 }
 
-/// Grey with colour, deep with shallow, float in both byte orders, one pixel: all are images.
-
 #[test]
 fn wrong_usage_is_two() {
     let dir = tempfile::tempdir().unwrap();
