@@ -268,7 +268,7 @@ mod tests {
     fn one_line_names_the_last_gap_and_counts_the_others() {
         let gap = |first| Gap { channel: 2, first, length: 10, snr_db: hybank::units::Decibels(12.0) };
         assert_eq!(gap_line(&[]), None);
-        assert_eq!(gap_line(&[gap(5)]).unwrap(), "gap: channel 2, sample 5, 10 missing");
+        assert_eq!(gap_line(&[gap(5)]).unwrap(), "gap: channel 2, sample 5, 10 missing, SNR 12.0 dB there");
         let line = gap_line(&[gap(5), gap(50)]).unwrap();
         assert_eq!(
             line,

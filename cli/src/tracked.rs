@@ -4,8 +4,9 @@ use super::capture_file::unread;
 use super::print::{Failure, InFile, failed, failed_at, print, print_report, warn};
 use super::run::Job;
 use super::written::{Mono, begin_recording};
+use hybank::bank::Bank;
 use hybank::captures::Captures;
-use hybank::files::commit_all;
+use hybank::files::{Bound, commit_all, read_text};
 use hybank::io::{MultiReader, read_stamped};
 use hybank::merge::{DelayTrack, Tracked, fuse_tracked};
 use hybank::messages::{Quoted, counted};
@@ -13,12 +14,19 @@ use hybank::quantity::readable;
 use hybank::units::Seconds;
 use std::path::{Path, PathBuf};
 
+/// Lines of more delays than a day has at ten a second.
+const TABLE: Bound = Bound {
+    bytes: 64 << 20,
+    kind: "a table of delays",
+    remedy: "give the file that was meant, or fewer lines",
+};
+
 /// The option.
 #[derive(Debug, clap::Args)]
 pub(super) struct TrackArgs {
-    /// Follow delays that change: a table (.csv) of a time and the delay of each channel, both in seconds,
-    /// with headings, as `time,delay 1,delay 2`. The delays of the spec do not count then, and taps are made
-    /// for those at hand; lost samples are left out
+    /// Follow delays that change: drift.jsonl of `align --trim`, or a table (.csv) of a time and the delay of
+    /// each channel, both in seconds, with headings, as `time,delay 1,delay 2`. Taps are made for the delays
+    /// at hand in place of those of the spec; lost samples are left out
     #[arg(long, value_name = "FILE", conflicts_with_all =
           ["bit_true", "algorithm", "gaps", "keep_latency", "measure", "report", "interleaved"])]
     track: Option<PathBuf>,
@@ -44,7 +52,7 @@ impl TrackArgs {
 
 /// Fuses what `reader` gives by the delays of a table.
 pub(super) fn fuse(job: &Job<'_>, table: &Path, mut reader: MultiReader) -> Result<(), Failure> {
-    let track = read(table)?;
+    let track = read(table, job.bank)?;
     let rate = job.output_rate(&reader)?;
     if reader.is_complex() {
         return Err(Failure::Input(
@@ -62,13 +70,44 @@ pub(super) fn fuse(job: &Job<'_>, table: &Path, mut reader: MultiReader) -> Resu
     report(job, &tracked, rate, warnings)
 }
 
-/// Reads the table of delays.
-fn read(path: &Path) -> Result<DelayTrack, Failure> {
+/// Reads the table of delays: lines of JSON as `align` writes them, or a table with headings.
+fn read(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
+    if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("jsonl")) {
+        return read_lines(path, bank);
+    }
     let table = read_stamped(path).map_err(failed)?.ok_or_else(|| {
-        failed_at(path, "no table of delays: its first line has no headings of which the first is a time, as `time,delay 1,delay 2`")
+        failed_at(
+            path,
+            "no table of delays: its first line has no headings of which the first is a time, as `time,delay 1,delay 2`",
+        )
     })?;
-    let delays = table.columns.into_iter().map(|column| column.into_iter().map(Seconds).collect()).collect();
-    Ok(DelayTrack { times: table.stamps, delays })
+    let seconds = |column: Vec<f64>| column.into_iter().map(Seconds).collect();
+    Ok(DelayTrack { times: table.stamps, delays: table.columns.into_iter().map(seconds).collect() })
+}
+
+/// A line of `drift.jsonl`.
+#[derive(Debug, serde::Deserialize)]
+struct Line {
+    frame: u64,
+    /// D_i in seconds; of a channel of which the line says nothing none.
+    delay: Vec<Option<f64>>,
+}
+
+fn read_lines(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
+    let text = read_text(path, TABLE).map_err(failed)?;
+    let (mut times, mut delays) = (Vec::new(), vec![Vec::new(); bank.channel_count()]);
+    for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+        let refused = |problem: String| failed_at(path, format!("line {}: {problem}", number + 1));
+        let Line { frame, delay } = serde_json::from_str(line).map_err(|error| refused(error.to_string()))?;
+        if delay.len() != delays.len() {
+            return Err(refused(format!("{} delays for {} channels", delay.len(), delays.len())));
+        }
+        // A line that says nothing of a channel is left to the lines around it.
+        let Some(delay) = delay.into_iter().collect::<Option<Vec<f64>>>() else { continue };
+        times.push(Seconds(frame as f64 * bank.slow_period().0));
+        delays.iter_mut().zip(delay).for_each(|(column, delay)| column.push(Seconds(delay)));
+    }
+    Ok(DelayTrack { times, delays })
 }
 
 fn report(job: &Job<'_>, tracked: &Tracked, rate: f64, warnings: Vec<String>) -> Result<(), Failure> {

@@ -9,7 +9,7 @@ const POINTS_PER_PERIOD: f64 = 48.0;
 /// Points of an interpolation, half of them on each side.
 const ORDER: usize = 12;
 /// Steps after which a phasor is computed again, so that products do not collect rounding errors.
-const RENEWAL: usize = 64;
+const RENEWAL: usize = 256;
 /// Terms that are summed side by side.
 const LANES: usize = 8;
 
@@ -44,9 +44,10 @@ impl Covariance {
         let begin = if is_even { half } else { 0 };
         let mut values = vec![0.0; 2 * half + 1];
         for group in terms.chunks(LANES) {
+            let turns = Turns::new(group, 1.0 / density);
             for (number, chunk) in values[begin..].chunks_mut(RENEWAL).enumerate() {
                 let start = first + (begin + number * RENEWAL) as f64 / density;
-                Phasors::new(group, start, 1.0 / density).add_to(chunk);
+                turns.add(group, start, chunk);
             }
         }
         for k in 0..begin {
@@ -68,33 +69,34 @@ impl Covariance {
     }
 }
 
-/// Some terms at one time, which turn from value to value. Their products do not wait for one another.
-struct Phasors {
-    real: [f64; LANES],
-    imaginary: [f64; LANES],
-    turns: [Complex<f64>; LANES],
+/// What some terms turn by from value to value. Their products do not wait for one another.
+struct Turns {
+    cosines: [f64; LANES],
+    sines: [f64; LANES],
 }
 
-impl Phasors {
-    fn new(terms: &[Term], start: f64, step: f64) -> Self {
+impl Turns {
+    fn new(terms: &[Term], step: f64) -> Self {
+        let (mut cosines, mut sines) = ([0.0; LANES], [0.0; LANES]);
+        for (lane, term) in terms.iter().enumerate() {
+            (sines[lane], cosines[lane]) = (TAU * term.frequency * step).sin_cos();
+        }
+        Self { cosines, sines }
+    }
+
+    /// Adds the sum of the terms, whose turns these are, from a time on.
+    fn add(&self, terms: &[Term], start: f64, values: &mut [f64]) {
         let (mut real, mut imaginary) = ([0.0; LANES], [0.0; LANES]);
-        let mut turns = [Complex::from(1.0); LANES];
         for (lane, term) in terms.iter().enumerate() {
             let phasor = term.amplitude * Complex::from_polar(1.0, TAU * term.frequency * start);
             (real[lane], imaginary[lane]) = (phasor.re, phasor.im);
-            turns[lane] = Complex::from_polar(1.0, TAU * term.frequency * step);
         }
-        Self { real, imaginary, turns }
-    }
-
-    fn add_to(mut self, values: &mut [f64]) {
-        let (cosines, sines) = (self.turns.map(|turn| turn.re), self.turns.map(|turn| turn.im));
         for value in values {
-            *value += self.real.iter().sum::<f64>();
+            *value += real.iter().sum::<f64>();
             for lane in 0..LANES {
-                let (re, im) = (self.real[lane], self.imaginary[lane]);
-                self.real[lane] = re * cosines[lane] - im * sines[lane];
-                self.imaginary[lane] = re * sines[lane] + im * cosines[lane];
+                let (re, im) = (real[lane], imaginary[lane]);
+                real[lane] = re * self.cosines[lane] - im * self.sines[lane];
+                imaginary[lane] = re * self.sines[lane] + im * self.cosines[lane];
             }
         }
     }

@@ -242,3 +242,53 @@ fn lost_samples_of_a_signal_are_estimated_as_well_as_predicted() {
     let clean: Vec<usize> = (200..23_400).filter(|&n| mask[n] == 0).collect();
     assert!(ratio(&clean) > 85.0, "{}", ratio(&clean));
 }
+
+/// Clocks that drift by 5 ppm over 2 s: the taps follow the delays of a table, of either kind.
+#[test]
+fn a_table_of_delays_is_followed() {
+    let desk = Desk::with_spec(
+        "fast_rate = 48000\nratio = 2\n[target]\nfilter = { family = \"butterworth\", order = 4, cutoff = 14000 }\n\
+         [signal]\nband = 18000\n[[channel]]\ndelay = 0\n[[channel]]\ndelay = \"10us\"\n\
+         [design]\nmethod = \"h2\"\ntaps = 64\n",
+    );
+    desk.good(&["design", "spec.toml", "-o", "bank.json"]);
+    let tones = "tones:440Hz,3.1kHz,7.3kHz,11.9kHz,16.1kHz";
+    desk.good(&[
+        "simulate",
+        "bank.json",
+        "--source",
+        tones,
+        "--samples",
+        "96000",
+        "--drift",
+        "0,5",
+        "-o",
+        "cap",
+    ]);
+    desk.write("delays.csv", "time,a,b\n0,0,1e-5\n2,0,2e-5\n");
+    desk.write(
+        "drift.jsonl",
+        "{\"frame\": 0, \"delay\": [0, 1e-5]}\n{\"frame\": 9, \"delay\": [0, null]}\n{\"frame\": 48000, \"delay\": [0, 2e-5]}\n",
+    );
+    let want = wav::samples(&desk, "cap/target.wav");
+    let snr = |more: &[&str]| {
+        let args = ["fuse", "bank.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "y.wav"];
+        let report = desk.report(&[&args[..], more].concat());
+        let got = wav::samples(&desk, "y.wav");
+        assert_eq!(got.len(), want.len());
+        let inner = 500..want.len() - 500;
+        let power: f64 = want[inner.clone()].iter().map(|x| f64::from(*x).powi(2)).sum();
+        let error: f64 = inner.map(|n| f64::from(got[n] - want[n]).powi(2)).sum();
+        (10.0 * (power / error).log10(), report)
+    };
+    let (fixed, _) = snr(&[]);
+    for table in ["delays.csv", "drift.jsonl"] {
+        let (followed, report) = snr(&["--track", table]);
+        let predicted = report["predicted_snr_db"].as_f64().unwrap();
+        assert!(followed > 75.0 && predicted > 75.0 && fixed < 40.0, "{followed}, {predicted}, {fixed}");
+    }
+    desk.write("one.csv", "time,a\n0,0\n");
+    let args = ["fuse", "bank.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "no.wav", "--track"];
+    desk.refused(1, &[&args[..], &["one.csv"]].concat(), &["one.csv", "1 column of delays", "2 channels"]);
+    desk.refused(2, &[&args[..], &["delays.csv", "--gaps"]].concat(), &["--gaps"]);
+}
