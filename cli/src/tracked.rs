@@ -24,9 +24,9 @@ const TABLE: Bound = Bound {
 /// The option.
 #[derive(Debug, clap::Args)]
 pub(super) struct TrackArgs {
-    /// Follow delays that change: drift.jsonl of `align --trim`, or a table (.csv) of a time and the delay of
-    /// each channel, both in seconds, with headings, as `time,delay 1,delay 2`. Taps are made for the delays
-    /// at hand in place of those of the spec; lost samples are left out
+    /// Follow delays that change: drift.jsonl of `align --trim`, or a table (.csv) of a time and the delay
+    /// of each channel, both in seconds, with headings, as `time,delay 1,delay 2`. Taps are made for the
+    /// delays at hand in place of those of the spec; lost samples are left out
     #[arg(long, value_name = "FILE", conflicts_with_all =
           ["bit_true", "algorithm", "gaps", "keep_latency", "measure", "report", "interleaved"])]
     track: Option<PathBuf>,

@@ -42,8 +42,8 @@ struct Trial {
 }
 
 impl Trials {
-    /// At `instants`, with `reach` samples of each recording on either side. `power` is the mean power of the
-    /// signal.
+    /// At `instants`, with `reach` samples of each recording on either side. `power` is the mean power of
+    /// the signal.
     pub fn new(
         estimator: &Estimator,
         recordings: &[Recording],

@@ -56,7 +56,8 @@ impl MissingSamples {
         Self { root, reach, samples, ratio, wait, errors }
     }
 
-    /// The place in the root, where frames stand from the newest on, of a place in the frames in their order.
+    /// The place in the root, where frames stand from the newest on, of a place in the frames in their
+    /// order.
     fn place(&self, index: usize) -> usize {
         let (frame, sample) = (index / self.samples, index % self.samples);
         (2 * self.reach - frame) * self.samples + sample
@@ -163,8 +164,8 @@ mod tests {
         Problem { noise, ..problem }
     }
 
-    /// The ratios at t = 0, 1/4 and 1/2 slow periods without the samples -5 to 4 of the second channel, from the
-    /// samples -23 to 24 of both, by dense solves with 1,600 nodes in other code.
+    /// The ratios at t = 0, 1/4 and 1/2 slow periods without the samples -5 to 4 of the second channel, from
+    /// the samples -23 to 24 of both, by dense solves with 1,600 nodes in other code.
     #[test]
     fn a_gap_costs_what_dense_solves_say() {
         // Sample n of both channels is in frame 24 + n of 49; the newest frame is at 0.
