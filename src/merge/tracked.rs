@@ -23,7 +23,7 @@ pub struct DelayTrack {
 pub struct Tracked {
     /// M for each frame; the first one is at the time of the first frame.
     pub samples: Vec<f64>,
-    /// The predicted signal-to-noise ratio, for a signal that is flat over the band.
+    /// The predicted signal-to-noise ratio away from the ends, for a signal that is flat over the band.
     pub snr: Decibels,
     /// Of the worst second.
     pub worst_second: Decibels,
@@ -77,8 +77,11 @@ fn clock(bank: &Bank, track: &DelayTrack, converter: usize) -> Result<Clock, Mer
     Clock::through(knots).map_err(|problem| MergeError::Track { channel: converter + 1, problem })
 }
 
+/// What the first and the last block have is that of the ends of a recording, where samples on one side lack.
 fn judged(fused: Fused, bank: &Bank) -> Tracked {
-    let errors: Vec<f64> = fused.errors.iter().map(|error| error.total()).collect();
+    let ends = usize::from(fused.errors.len() > 2);
+    let inner = &fused.errors[ends..fused.errors.len() - ends];
+    let errors: Vec<f64> = inner.iter().map(|error| error.total()).collect();
     let block = Seconds(fused.block as f64 * bank.fast_period.0);
     let second = ((1.0 / block.0).round() as usize).clamp(1, errors.len().max(1));
     let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
@@ -88,7 +91,7 @@ fn judged(fused: Fused, bank: &Bank) -> Tracked {
     Tracked {
         snr: ratio(mean(&errors)),
         worst_second: ratio(of_second.get(worst).copied().unwrap_or_default()),
-        worst_at: Seconds(worst as f64 * block.0),
+        worst_at: Seconds((ends + worst) as f64 * block.0),
         samples: fused.samples,
     }
 }

@@ -16,7 +16,7 @@ use support::{Desk, THESIS, wav};
 
 /// Two recordings of forty samples, a spec and its bank.
 fn desk() -> Desk {
-    let desk = Desk::new();
+    let desk = Desk::with_model();
     desk.write("spec.toml", THESIS);
     let mut dice = Random(18);
     let mut noise = || (0..40).map(|_| dice.sample() as f32).collect::<Vec<_>>();
