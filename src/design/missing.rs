@@ -20,7 +20,7 @@ const SAMPLES: usize = 48;
 ///
 /// With the samples y and the target z as random variables, the estimate of a missing sample is its
 /// projection on the known ones, and the error of an output that of the projection of z on them
-/// ([`RootCovariance`]).
+/// (`design/root_covariance.rs`).
 #[derive(Debug)]
 pub struct MissingSamples {
     root: RootCovariance,

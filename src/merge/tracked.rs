@@ -77,7 +77,7 @@ fn clock(bank: &Bank, track: &DelayTrack, converter: usize) -> Result<Clock, Mer
     Clock::through(knots).map_err(|problem| MergeError::Track { channel: converter + 1, problem })
 }
 
-/// What the first and the last block have is that of the ends of a recording, where samples on one side lack.
+/// The first and the last block have the errors of the ends of a recording, where samples on one side lack.
 fn judged(fused: Fused, bank: &Bank) -> Tracked {
     let ends = usize::from(fused.errors.len() > 2);
     let inner = &fused.errors[ends..fused.errors.len() - ends];
