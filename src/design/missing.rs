@@ -2,21 +2,17 @@
 
 use super::DesignError;
 use super::deviations::Deviations;
-use super::problem::{Channel, Problem};
+use super::known_instants::with_noise;
+use super::problem::Problem;
 use super::root_covariance::RootCovariance;
 use crate::bank::Bank;
-use crate::instants::{Converter, Estimator, Signals, Spectrum};
-use crate::linalg::Complex;
 use crate::pipeline::{GapEstimate, GapEstimator};
-use crate::spec::{ROUNDING_16_BITS, Spec, USUAL_RMS};
-use crate::units::{CyclesPerFastPeriod, FastPeriods, RadiansPerFastPeriod};
-use std::f64::consts::TAU;
 
 /// Samples of all converters on either side of a frame, about.
 const SAMPLES: usize = 48;
 
-/// Estimates missing samples by the model of a bank: its front ends, delays and gains, the spectrum and the
-/// noise of its spec; converters without stated noise have that of 16 bits.
+/// Estimates missing samples by the spec of a bank: its front ends, delays and gains with their uncertainty,
+/// the spectrum of the signal and the noise; a converter without stated noise has that of 16 bits.
 ///
 /// With the samples y and the target z as random variables, the estimate of a missing sample is its
 /// projection on the known ones, and the error of an output that of the projection of z on them
@@ -44,14 +40,15 @@ impl MissingSamples {
     pub fn of_bank(bank: &Bank) -> Result<Self, DesignError> {
         let problem = Problem::of_bank(bank)?;
         problem.check_size()?;
-        Ok(Self::of(&with_noise(problem, bank.spec.as_ref())))
+        let deviations = bank.spec.as_ref().map(Deviations::uncertain).unwrap_or_default();
+        Ok(Self::of(&with_noise(problem, bank.spec.as_ref()), &deviations))
     }
 
-    fn of(problem: &Problem) -> Self {
+    fn of(problem: &Problem, deviations: &[Deviations]) -> Self {
         let (samples, ratio, wait) = (problem.channels.len(), problem.ratio, problem.wait);
         let reach = SAMPLES.div_ceil(samples);
         let instants = instants(reach, ratio, wait);
-        let root = RootCovariance::new(problem, &[], 2 * reach + 1, instants[0]..=instants[ratio - 1]);
+        let root = RootCovariance::new(problem, deviations, 2 * reach + 1, instants[0]..=instants[ratio - 1]);
         let errors = instants.iter().map(|&instant| root.error(2 * reach + 1, instant)).collect();
         Self { root, reach, samples, ratio, wait, errors }
     }
@@ -93,62 +90,17 @@ impl GapEstimator for MissingSamples {
     }
 }
 
-/// The estimator of the target of a bank from samples at any instants up to `longest` apart, by the same
-/// model.
-/// Deviations of delays and gains are those of the spec.
-///
-/// # Errors
-/// As [`MissingSamples::of_bank`]; [`DesignError::NoBand`] for a signal without one.
-pub fn instants_estimator(bank: &Bank, longest: FastPeriods) -> Result<Estimator, DesignError> {
-    let problem = Problem::of_bank(bank)?;
-    let band = problem.band.ok_or(DesignError::NoBand)?.map(|end| CyclesPerFastPeriod(end.0 / TAU));
-    let problem = with_noise(problem, bank.spec.as_ref());
-    // Noise counts for unit density in the band and its mirror there, and for a signal of power 1 here.
-    let density = RootCovariance::new(&problem, &[], 1, 0..=0).noise_scale / (2.0 * (band[1] - band[0]).0);
-    let deviations = bank.spec.as_ref().map(Deviations::of_spec).unwrap_or_default();
-    let converter = |(channel, noise): (&Channel, &f64)| {
-        let Deviations { delay, gain, .. } = deviations.get(channel.converter).copied().unwrap_or_default();
-        Converter {
-            front_end: channel.front_end,
-            gain: channel.gain,
-            noise: noise * density,
-            delay_deviation: delay,
-            gain_deviation: gain,
-        }
-    };
-    let converters = problem.channels.iter().zip(&problem.noise).map(converter).collect();
-    let response = |front_end: usize| {
-        let filter = &problem.front_ends[front_end];
-        move |f: CyclesPerFastPeriod| filter.response(RadiansPerFastPeriod(TAU * f.0))
-    };
-    let responses: Vec<_> = (0..problem.front_ends.len()).map(response).collect();
-    let responses: Vec<&dyn Fn(CyclesPerFastPeriod) -> Complex<f64>> =
-        responses.iter().map(|response| response as _).collect();
-    let spectrum = Spectrum::flat(band[0]..band[1], longest);
-    Ok(Estimator::new(Signals::new(&spectrum, &responses, problem.target, converters)))
-}
-
 /// The outputs of the middle frame, after the newest frame.
 fn instants(reach: usize, ratio: usize, wait: usize) -> Vec<i64> {
     (0..ratio).map(|p| p as i64 - (reach * ratio + wait) as i64).collect()
 }
 
-/// With the noise of 16 bits where none is stated: without any, tiny differences of samples would count.
-fn with_noise(problem: Problem, spec: Option<&Spec>) -> Problem {
-    if problem.noise.iter().any(|power| *power > 0.0) {
-        return problem;
-    }
-    let rms = spec.and_then(|spec| spec.signal.as_ref()).map_or(USUAL_RMS, |signal| signal.rms);
-    let target = RootCovariance::new(&problem, &[], 1, 0..=0);
-    let noise = ROUNDING_16_BITS / (rms * rms) * target.power / target.noise_scale;
-    Problem { noise: vec![noise; problem.channels.len()], ..problem }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spec::Spec;
 
-    /// Two channels of 24 kS/s behind Butterworth 4 at 14 kHz, the second 0.4 periods later, band to 18 kHz;
+    /// Two channels of 24 kS/s after Butterworth 4 at 14 kHz, the second 0.4 periods later, band to 18 kHz;
     /// noise of 1e-8 and 1e-8 / 0.36 of the signal before the filters.
     fn two_channels() -> Problem {
         let text = "fast_rate = 96000\nratio = 4\n\
@@ -192,7 +144,7 @@ mod tests {
     /// samples that are there.
     #[test]
     fn estimates_of_samples_make_the_best_outputs() {
-        let missing = MissingSamples::of(&two_channels());
+        let missing = MissingSamples::of(&two_channels(), &[]);
         let (reach, frames) = (missing.reach, 2 * missing.reach + 1);
         let mut is_there = vec![true; 2 * frames];
         (is_there[2 * reach], is_there[2 * reach + 1]) = (false, false);

@@ -21,8 +21,8 @@ pub(super) struct Cost {
 /// The costs of all missing samples that affect an output.
 ///
 /// An output that weighs the sample k by g_k errs by `sum g_k e_k`. Whatever errors e_k have to do with one
-/// another, the root of its mean square is at most `sum |g_k| d_k` with their deviations d_k. In long gaps
-/// that is too much; an output is not worse there than where all is missing around it.
+/// another, the root of its mean square is at most `sum |g_k| d_k` with their deviations d_k. For long gaps
+/// this bound is too large. It is cut at the largest error of the outputs during the gap, which is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Affected {
     root: f64,
@@ -49,12 +49,6 @@ impl Costs {
         let responses = (0..offsets.len()).map(|i| response(plan, offsets, i)).collect();
         let (outputs, marks) = (Vec::new(), Vec::new());
         Self { ratio: plan.ratio(), responses, error, outputs, marks, used: 0 }
-    }
-
-    /// M.
-    #[cfg(test)]
-    pub(super) fn ratio(&self) -> usize {
-        self.ratio
     }
 
     /// Begins with the outputs of the next frames.

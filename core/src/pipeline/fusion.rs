@@ -1,4 +1,5 @@
-//! The one loop of all runs: fills gaps, filters, drops the latency and keeps the marks aligned.
+//! The one loop of all runs: estimates missing samples, filters, drops the latency and keeps the marks
+//! aligned.
 
 use super::gaps::{GapEstimator, GapFiller};
 use super::{Gap, Outcome};
@@ -154,6 +155,7 @@ impl<'a> Fusion<'a> {
         most: usize,
         output: &mut dyn SplitOutput,
     ) -> Result<usize, ProcessError> {
+        // Its frames are read while the streams change.
         let Some(gaps) = self.gaps.take() else { return Ok(0) };
         let filled = |part| Interleaved::new(gaps.filled(part), self.offsets.len());
         let filled: Result<Vec<_>, _> = (0..self.parts()).map(filled).collect();
@@ -213,7 +215,7 @@ impl<'a> Fusion<'a> {
         self.step(&vec![part; self.parts()], most, output)
     }
 
-    /// The marks of the outputs of the last step, if gaps are filled.
+    /// The marks of the outputs of the last step, if missing samples are estimated.
     pub(super) fn marks(&self) -> Option<&[u8]> {
         self.gaps.as_ref().map(|gaps| gaps.marks(self.kept.clone()))
     }

@@ -1,9 +1,9 @@
 //! Missing samples: their estimates from the samples around them, and their places.
 //!
 //! A missing sample is marked by NaN; a complex sample is missing if one of its parts is. It is replaced by
-//! its linear estimate of least mean-square error from all samples of the frames around it. Estimates of
-//! estimates are estimates: a bank whose taps are the best ones for all samples so gives the best output for
-//! those that remain, with the taps that it has.
+//! its linear estimate of least mean-square error from all samples of the frames around it, its projection
+//! on them. The projection of a projection is that of the whole. So a bank whose taps are best for all
+//! samples, with estimates for the missing ones, gives the best output for those that remain.
 
 use super::cost::{Cost, Costs};
 use crate::bank::{Bank, FrameLayout, FrameSample};
@@ -29,7 +29,8 @@ pub struct Gap {
     pub first: u64,
     /// Samples that are missing.
     pub length: u64,
-    /// The predicted signal-to-noise ratio of the worst frame of outputs during the gap.
+    /// The predicted signal-to-noise ratio of the worst output during the gap: what the known samples of the
+    /// frames around leave unknown. A bank with less latency or fewer taps has errors of its own besides.
     pub snr_db: Decibels,
 }
 

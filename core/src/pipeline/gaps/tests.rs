@@ -55,7 +55,7 @@ fn filler(bank: &Bank, reach: usize, parts: usize) -> GapFiller {
 
 /// All frames of one part, in blocks, with their marks.
 fn run(filler: &mut GapFiller, frames: &[f64], block: usize) -> (Vec<f64>, Vec<u8>) {
-    let (n, ratio) = (filler.samples.len(), filler.costs.ratio());
+    let (n, ratio) = (filler.samples.len(), filler.layout.ratio());
     let (mut filled, mut marks) = (Vec::new(), Vec::new());
     let mut take = |filler: &mut GapFiller, out: usize| {
         filled.extend_from_slice(filler.filled(0));
