@@ -82,7 +82,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     };
     let merged = merge(&sources, settings).map_err(failed)?;
     warnings.extend(merged.warnings.iter().map(ToString::to_string));
-    args.write(&merged, origin)?;
+    warnings.extend(args.write(&merged, origin)?);
     let report = Report::new(names, &merged, warnings);
     report.warnings.iter().for_each(|text| warn(text));
     if is_dash(&args.output) { Ok(()) } else { show(&report, args.json, |report| report.text(&args.output)) }
@@ -157,19 +157,21 @@ impl Args {
         Ok(Source { name: name(path), record, rate, step, stamps: None })
     }
 
-    /// Writes the result; times of a table count from that of the first sample of the first recording,
-    /// `origin`.
-    fn write(&self, merged: &Merged, origin: f64) -> Result<(), Failure> {
+    /// Writes the result, and says what could not be kept; times of a table count from that of the first
+    /// sample of the first recording, `origin`.
+    fn write(&self, merged: &Merged, origin: f64) -> Result<Option<String>, Failure> {
         let (samples, rate) = (&merged.samples, merged.rate.0);
         if self.is_table() {
             let begin = origin + merged.begin.0;
             let line = |(n, x): (usize, &f64)| format!("{},{x}\n", begin + n as f64 / rate);
             let lines: String = samples.iter().enumerate().map(line).collect();
-            return write_text(&self.output, &("time,x\n".to_owned() + &lines), self.force);
+            write_text(&self.output, &("time,x\n".to_owned() + &lines), self.force)?;
+            return Ok(None);
         }
         let mono = Mono { samples, imaginary: None, rate, format: self.bits, container: Container::Wav };
         let files = begin_recording(&self.output, mono, self.force)?;
-        commit_all(files).map_err(failed)
+        commit_all(files).map_err(failed)?;
+        Ok(mono.clipped())
     }
 }
 

@@ -1,14 +1,14 @@
 //! `fuse --track`: delays that change, from a table.
 
 use super::capture_file::unread;
-use super::print::{Failure, InFile, failed, failed_at, print, print_report, warn};
+use super::print::{Failure, check_strict, failed, failed_at, is_dash, print, print_report, warn};
 use super::run::Job;
 use super::written::{Mono, begin_recording};
 use hybank::bank::Bank;
 use hybank::captures::Captures;
 use hybank::files::{Bound, commit_all, read_text};
 use hybank::io::{MultiReader, read_stamped};
-use hybank::merge::{DelayTrack, Tracked, fuse_tracked};
+use hybank::merge::{DelayTrack, MergeError, Tracked, fuse_tracked};
 use hybank::messages::{Quoted, counted};
 use hybank::quantity::readable;
 use hybank::units::Seconds;
@@ -28,7 +28,7 @@ pub(super) struct TrackArgs {
     /// of each channel, both in seconds, with headings, as `time,delay 1,delay 2`. Taps are made for the
     /// delays at hand in place of those of the spec; lost samples are left out
     #[arg(long, value_name = "FILE", conflicts_with_all =
-          ["bit_true", "algorithm", "gaps", "keep_latency", "measure", "report", "interleaved"])]
+          ["bit_true", "algorithm", "gaps", "keep_latency", "measure", "report", "interleaved", "threads"])]
     track: Option<PathBuf>,
 }
 
@@ -61,11 +61,18 @@ pub(super) fn fuse(job: &Job<'_>, table: &Path, mut reader: MultiReader) -> Resu
     }
     let captures = Captures::read(&mut reader, usize::MAX).map_err(unread)?;
     let channels: Vec<Vec<f64>> = captures.channels.into_iter().map(|channel| channel.samples).collect();
-    let tracked = fuse_tracked(job.bank, &channels, &track).in_file(table)?;
+    let tracked = fuse_tracked(job.bank, &channels, &track).map_err(|error| match error {
+        MergeError::Design(_) | MergeError::OwnRates => failed_at(job.bank_path, error),
+        MergeError::NoSamples => failed(error),
+        error => failed_at(table, error),
+    })?;
     let samples = &tracked.samples;
     let mono = Mono { samples, imaginary: None, rate, format: job.format, container: job.container };
-    commit_all(begin_recording(job.output, mono, job.args.force)?).map_err(failed)?;
-    let warnings: Vec<String> = reader.warnings().iter().map(ToString::to_string).collect();
+    let files = begin_recording(job.output, mono, job.args.force)?;
+    let warnings: Vec<String> =
+        reader.warnings().iter().map(ToString::to_string).chain(mono.clipped()).collect();
+    check_strict(&warnings, job.args.strict)?;
+    commit_all(files).map_err(failed)?;
     warnings.iter().for_each(|text| warn(text));
     report(job, &tracked, rate, warnings)
 }
@@ -100,7 +107,7 @@ fn read_lines(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
         let refused = |problem: String| failed_at(path, format!("line {}: {problem}", number + 1));
         let Line { frame, delay } = serde_json::from_str(line).map_err(|error| refused(error.to_string()))?;
         if delay.len() != delays.len() {
-            return Err(refused(format!("{} delays for {} channels", delay.len(), delays.len())));
+            return Err(refused(format!("{} for {} channels", counted(delay.len(), "delay"), delays.len())));
         }
         // A line that says nothing of a channel is left to the lines around it.
         let Some(delay) = delay.into_iter().collect::<Option<Vec<f64>>>() else { continue };
@@ -121,6 +128,9 @@ fn report(job: &Job<'_>, tracked: &Tracked, rate: f64, warnings: Vec<String>) ->
     };
     if job.args.json {
         return print_report(&report, job.output);
+    }
+    if is_dash(job.output) {
+        return Ok(());
     }
     print(&format!(
         "{}: {} at {}, predicted SNR {:.1} dB, {:.1} dB in the worst second ({:.1} s after the beginning)\n",

@@ -3,6 +3,7 @@
 use super::print::{Failure, failed, failed_at, is_dash, print_bytes};
 use hybank::files::{self, AtomicFile, FileError, commit_all, refuse_overlaps};
 use hybank::io::{Container, OutputHeader, PcmFormat, SampleWriter};
+use hybank::pipeline::Warning;
 use std::io::Write;
 use std::path::Path;
 
@@ -105,6 +106,14 @@ impl<'a> Mono<'a> {
     /// Real samples in a WAV file of floats.
     pub(super) fn wav(samples: &'a [f64], rate: f64) -> Self {
         Self { samples, imaginary: None, rate, format: PcmFormat::F32Le, container: Container::Wav }
+    }
+
+    /// A warning of samples beyond full scale, which integers cannot hold.
+    pub(super) fn clipped(&self) -> Option<String> {
+        let numbers = [Some(self.samples), self.imaginary].into_iter().flatten().flatten();
+        let count = numbers.filter(|x| x.abs() > 1.0).count() as u64;
+        (count > 0 && !self.format.is_float())
+            .then(|| format!("{}; --bits 32f keeps them", Warning::Clipped(count)))
     }
 
     /// Writes its files, which have no names yet.

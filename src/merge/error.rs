@@ -90,15 +90,22 @@ pub enum MergeError {
         /// Channels of the bank.
         wanted: usize,
     },
-    /// Delays that turn time back.
+    /// A table without delays.
+    #[error("the table has no line with the delays of all channels; give at least one")]
+    NoDelays,
+    /// Nothing to fuse.
+    #[error("no samples to fuse (the length is zero); give longer recordings")]
+    NoSamples,
+    /// A delay that is no number, or delays that turn time back.
     #[error(
-        "the delays of channel {channel} change by a sample and more from one line to the next ({problem})"
+        "at frame {frame} a delay of channel {channel} is missing, or grows by more than the time since the line before; \
+         correct the line"
     )]
     Track {
         /// From 1.
         channel: usize,
-        /// What is wrong.
-        problem: ClockError,
+        /// Where, from 0.
+        frame: f64,
     },
     /// The converters of a bank are not known.
     #[error(transparent)]

@@ -203,21 +203,35 @@ fn quality(
         .map(|(block, error)| error.signal * power(block) + error.noise * model.power * block.len() as f64)
         .collect();
     let total = power(&fused.samples);
-    let second = ((rate.0 / fused.block as f64).round() as usize).clamp(1, errors.len());
-    let of_second = |k: usize| errors[k..k + second].iter().sum::<f64>();
-    let worst =
-        (0..=errors.len() - second).max_by(|a, b| of_second(*a).total_cmp(&of_second(*b))).unwrap_or(0);
     let per_sample = total / fused.samples.len() as f64;
-    let of_worst = of_second(worst) / (second * fused.block) as f64;
+    let worst = worst_second(&errors, rate.0 / fused.block as f64);
+    let of_worst = worst.mean / fused.block as f64;
     let ways = model.ways(recordings, grid)?;
     let ratio = |error: f64| Decibels::of_power(1.0 / error.max(f64::MIN_POSITIVE));
     Ok(Quality {
         snr: ratio(errors.iter().sum::<f64>() / total),
         worst_second: ratio(of_worst / per_sample),
-        worst_at: Seconds((worst * fused.block) as f64 / rate.0),
+        worst_at: Seconds((worst.first * fused.block) as f64 / rate.0),
         alone: ways.alone.iter().map(|error| ratio(error.total())).collect(),
         mean: ratio(ways.mean.total()),
     })
+}
+
+/// The second of a run that has the largest errors.
+struct WorstSecond {
+    /// Its first block.
+    first: usize,
+    /// The mean error of its blocks.
+    mean: f64,
+}
+
+/// Of blocks with these errors, so many of them a second.
+fn worst_second(errors: &[f64], per_second: f64) -> WorstSecond {
+    let second = (per_second.round() as usize).clamp(1, errors.len().max(1));
+    let means = errors.windows(second).map(|blocks| blocks.iter().sum::<f64>() / second as f64);
+    let of = |(first, mean)| WorstSecond { first, mean };
+    let worst = means.enumerate().map(of).max_by(|a, b| a.mean.total_cmp(&b.mean));
+    worst.unwrap_or(WorstSecond { first: 0, mean: 0.0 })
 }
 
 #[cfg(test)]

@@ -1,13 +1,11 @@
 //! Converters whose delays change: the fusion of their recordings by a table of delays over time.
 
 use super::error::MergeError;
+use super::{REACH, check_memory, worst_second};
 use crate::bank::Bank;
 use crate::design;
-use crate::instants::{Clock, Fused, FusionSettings, Recording, fuse};
+use crate::instants::{Clock, ClockError, Fused, FusionSettings, Recording, fuse};
 use crate::units::{Decibels, FastPeriods, Seconds};
-
-/// Samples of each recording on either side of an output.
-const REACH: usize = 24;
 
 /// The delays of all converters at some times, on lines between them.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,7 +34,7 @@ pub struct Tracked {
 ///
 /// # Errors
 /// [`MergeError`]: for a bank without a spec, a band or one rate of its converters; for a table of other
-/// converters, or of delays that jump by a sample and more.
+/// converters, without delays, or of delays that jump by a sample and more; for recordings without samples.
 pub fn fuse_tracked(bank: &Bank, channels: &[Vec<f64>], track: &DelayTrack) -> Result<Tracked, MergeError> {
     if bank.samples.iter().any(|samples| *samples != 1) {
         return Err(MergeError::OwnRates);
@@ -44,16 +42,20 @@ pub fn fuse_tracked(bank: &Bank, channels: &[Vec<f64>], track: &DelayTrack) -> R
     if track.delays.len() != bank.channel_count() {
         return Err(MergeError::Columns { given: track.delays.len(), wanted: bank.channel_count() });
     }
-    let recordings: Vec<Recording> = channels
-        .iter()
-        .enumerate()
-        .map(|(i, samples)| {
-            let offset = bank.offsets[i];
-            let own = samples.iter().map(|x| x - offset).collect();
-            Ok(Recording::new(own, clock(bank, track, i)?, i))
-        })
-        .collect::<Result<_, MergeError>>()?;
-    let count = channels.first().map_or(0, Vec::len) * bank.ratio;
+    if track.times.is_empty() {
+        return Err(MergeError::NoDelays);
+    }
+    let count = channels.iter().map(Vec::len).min().unwrap_or(0).saturating_mul(bank.ratio);
+    if count == 0 {
+        return Err(MergeError::NoSamples);
+    }
+    check_memory(count)?;
+    let recording = |(i, samples): (usize, &Vec<f64>)| {
+        let own = samples.iter().map(|x| x - bank.offsets[i]).collect();
+        Ok(Recording::new(own, clock(bank, track, i)?, i))
+    };
+    let recordings: Vec<Recording> =
+        channels.iter().enumerate().map(recording).collect::<Result<_, MergeError>>()?;
     let settings = FusionSettings { first: FastPeriods(0.0), count, reach: REACH };
     let estimator = design::instants_estimator(bank, settings.longest(&recordings))?;
     let fused = fuse(&estimator, &recordings, settings)?;
@@ -67,14 +69,15 @@ fn clock(bank: &Bank, track: &DelayTrack, converter: usize) -> Result<Clock, Mer
         let [nominal, delay] = [*time, *delay].map(|time| time.in_fast_periods(bank.fast_period).0);
         (nominal / period, FastPeriods(nominal - delay))
     };
-    let mut knots: Vec<(f64, FastPeriods)> =
-        track.times.iter().zip(&track.delays[converter]).map(knot).collect();
+    let knots: Vec<(f64, FastPeriods)> = track.times.iter().zip(&track.delays[converter]).map(knot).collect();
     // Before the first time and after the last one the delay stays.
-    if let (Some(&(first, begin)), Some(&(last, end))) = (knots.first(), knots.last()) {
-        knots.insert(0, (first - 1.0, begin - FastPeriods(period)));
-        knots.push((last + 1.0, end + FastPeriods(period)));
-    }
-    Clock::through(knots).map_err(|problem| MergeError::Track { channel: converter + 1, problem })
+    let earlier = knots.first().map(|&(sample, instant)| (sample - 1.0, instant - FastPeriods(period)));
+    let later = knots.last().map(|&(sample, instant)| (sample + 1.0, instant + FastPeriods(period)));
+    Clock::through(earlier.into_iter().chain(knots.iter().copied()).chain(later)).map_err(|problem| {
+        // There are three knots and more.
+        let frame = if let ClockError::NotAscending { sample } = problem { sample } else { 0.0 };
+        MergeError::Track { channel: converter + 1, frame }
+    })
 }
 
 /// The first and the last block have the errors of the ends of a recording, where samples on one side lack.
@@ -83,15 +86,12 @@ fn judged(fused: Fused, bank: &Bank) -> Tracked {
     let inner = &fused.errors[ends..fused.errors.len() - ends];
     let errors: Vec<f64> = inner.iter().map(|error| error.total()).collect();
     let block = Seconds(fused.block as f64 * bank.fast_period.0);
-    let second = ((1.0 / block.0).round() as usize).clamp(1, errors.len().max(1));
-    let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
-    let of_second: Vec<f64> = errors.windows(second).map(mean).collect();
-    let worst = (0..of_second.len()).max_by(|a, b| of_second[*a].total_cmp(&of_second[*b])).unwrap_or(0);
+    let worst = worst_second(&errors, 1.0 / block.0);
     let ratio = |error: f64| Decibels::of_power(1.0 / error.max(f64::MIN_POSITIVE));
     Tracked {
-        snr: ratio(mean(&errors)),
-        worst_second: ratio(of_second.get(worst).copied().unwrap_or_default()),
-        worst_at: Seconds((ends + worst) as f64 * block.0),
+        snr: ratio(errors.iter().sum::<f64>() / errors.len() as f64),
+        worst_second: ratio(worst.mean),
+        worst_at: Seconds((ends + worst.first) as f64 * block.0),
         samples: fused.samples,
     }
 }
@@ -170,6 +170,11 @@ mod tests {
         let refused = |delays| fuse_tracked(&bank, &channels, &track(delays)).unwrap_err().to_string();
         assert!(refused(vec![vec![0.0; 2]]).contains("1 column of delays, and the bank has 2 channels"));
         assert!(refused(vec![vec![0.0; 2], vec![0.0, 2e-3]]).contains("channel 2"));
+        let none = DelayTrack { times: Vec::new(), delays: vec![Vec::new(); 2] };
+        assert_eq!(fuse_tracked(&bank, &channels, &none), Err(MergeError::NoDelays));
+        let still = track(vec![vec![0.0; 2]; 2]);
+        assert_eq!(fuse_tracked(&bank, &[vec![], vec![]], &still), Err(MergeError::NoSamples));
+        assert_eq!(fuse_tracked(&bank, &channels, &still).unwrap().samples, vec![0.0; 200]);
         let bare = Bank { spec: None, ..bank.clone() };
         let error = fuse_tracked(&bare, &channels, &track(vec![vec![0.0; 2]; 2])).unwrap_err();
         assert!(error.to_string().contains("no spec"), "{error}");

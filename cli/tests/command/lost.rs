@@ -178,16 +178,22 @@ fn captures_tell_stream_what_was_lost() {
     desk.refused(1, &[&both[..], &["--force"]].concat(), &["b.sigmf-meta", "captures of its own"]);
 }
 
+/// Two converters of 24 kS/s, with their bank for a band of 18 kHz.
+fn two_converters(delay: &str) -> Desk {
+    let desk = Desk::with_spec(&format!(
+        "fast_rate = 48000\nratio = 2\n[signal]\nband = 18000\n[design]\nmethod = \"h2\"\ntaps = 64\n\
+         [target]\nfilter = {{ family = \"butterworth\", order = 4, cutoff = 14000 }}\n\
+         [[channel]]\ndelay = 0\n[[channel]]\ndelay = \"{delay}\"\n"
+    ));
+    desk.good(&["design", "spec.toml", "-o", "bank.json"]);
+    desk
+}
+
 /// A signal in the band of a bank whose converters lost samples: one alone, ten of one converter, three of
 /// both. The predicted ratio of each gap is the measured one.
 #[test]
 fn lost_samples_of_a_signal_are_estimated_as_well_as_predicted() {
-    let desk = Desk::with_spec(
-        "fast_rate = 48000\nratio = 2\n[target]\nfilter = { family = \"butterworth\", order = 4, cutoff = 14000 }\n\
-         [signal]\nband = 18000\n[[channel]]\ndelay = 0\n[[channel]]\ndelay = \"1.1 samples\"\n\
-         [design]\nmethod = \"h2\"\ntaps = 64\n",
-    );
-    desk.good(&["design", "spec.toml", "-o", "bank.json"]);
+    let desk = two_converters("1.1 samples");
     let mut random = Random(3);
     let tones: Vec<[f64; 3]> = (0..400)
         .map(|_| {
@@ -246,12 +252,7 @@ fn lost_samples_of_a_signal_are_estimated_as_well_as_predicted() {
 /// Clocks that drift by 5 ppm over 2 s: the taps follow the delays of a table, of either kind.
 #[test]
 fn a_table_of_delays_is_followed() {
-    let desk = Desk::with_spec(
-        "fast_rate = 48000\nratio = 2\n[target]\nfilter = { family = \"butterworth\", order = 4, cutoff = 14000 }\n\
-         [signal]\nband = 18000\n[[channel]]\ndelay = 0\n[[channel]]\ndelay = \"10us\"\n\
-         [design]\nmethod = \"h2\"\ntaps = 64\n",
-    );
-    desk.good(&["design", "spec.toml", "-o", "bank.json"]);
+    let desk = two_converters("10us");
     let tones = "tones:440Hz,3.1kHz,7.3kHz,11.9kHz,16.1kHz";
     desk.good(&[
         "simulate",
@@ -291,4 +292,32 @@ fn a_table_of_delays_is_followed() {
     let args = ["fuse", "bank.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "no.wav", "--track"];
     desk.refused(1, &[&args[..], &["one.csv"]].concat(), &["one.csv", "1 column of delays", "2 channels"]);
     desk.refused(2, &[&args[..], &["delays.csv", "--gaps"]].concat(), &["--gaps"]);
+    desk.write("jump.csv", "time,a,b\n0,0,0\n1,0,1.5\n");
+    desk.refused(1, &[&args[..], &["jump.csv"]].concat(), &["jump.csv", "frame 24000", "channel 2"]);
+    desk.write("none.jsonl", "{\"frame\": 0, \"delay\": [0, null]}\n");
+    desk.refused(1, &[&args[..], &["none.jsonl"]].concat(), &["none.jsonl", "no line with the delays"]);
+    desk.write("bad.jsonl", "{\"frame\": 0, \"delay\": [0]}\n");
+    desk.refused(
+        1,
+        &[&args[..], &["bad.jsonl"]].concat(),
+        &["bad.jsonl", "line 1", "1 delay for 2 channels"],
+    );
+    // Integers cannot hold what is beyond full scale.
+    let loud: Vec<f32> = wav::samples(&desk, "cap/ch1.wav").iter().map(|x| 9.0 * x).collect();
+    wav::write(&desk, "loud.wav", 1, 24_000, &loud);
+    let args = [
+        "fuse",
+        "bank.json",
+        "loud.wav",
+        "loud.wav",
+        "-o",
+        "loud16.wav",
+        "--bits",
+        "16",
+        "--track",
+        "delays.csv",
+    ];
+    let warnings = desk.report(&args)["warnings"].to_string();
+    assert!(warnings.contains("clipped") && warnings.contains("--bits 32f"), "{warnings}");
+    desk.refused(1, &[&args[..], &["--strict", "--force"]].concat(), &["clipped", "--strict"]);
 }
