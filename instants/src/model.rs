@@ -100,7 +100,7 @@ impl Model {
         noise: &dyn Fn(f64) -> Vec<f64>,
     ) -> Result<Self, LinalgError> {
         let longest = settings.longest(recordings);
-        let model = |spectrum: Spectrum, share: f64| Self::new(spectrum, power, noise(share), prior);
+        let model = |spectrum: Spectrum| Self::new(spectrum, power, noise(FIRST_NOISES[0]), prior);
         let (low, high) = (CyclesPerFastPeriod(0.0), CyclesPerFastPeriod(0.5));
         let spectra: Vec<Spectrum> = match prior.band {
             Some(band) => vec![Spectrum::flat(low..band, longest)],
@@ -109,21 +109,20 @@ impl Model {
                 .map(|band| Spectrum::of_pieces([(low..band, 1.0), (band..high, BEYOND)], longest))
                 .collect(),
         };
-        let mut best = None;
+        let mut best = model(spectra[0].clone());
         let mut least = f64::INFINITY;
         for spectrum in spectra {
-            let [quiet, ..] = FIRST_NOISES;
-            let candidate = model(spectrum, quiet);
+            let candidate = model(spectrum);
             let trials = candidate.trials(recordings, settings);
             for share in FIRST_NOISES {
                 let noise = noise(share);
                 let misfit = candidate.misfit(&trials, &noise)?;
-                if misfit < least || best.is_none() {
-                    (best, least) = (Some(candidate.with_noise(noise)), misfit);
+                if misfit < least {
+                    (best, least) = (candidate.with_noise(noise), misfit);
                 }
             }
         }
-        Ok(best.unwrap_or_else(|| model(Spectrum::flat(low..high, longest), FIRST_NOISES[0])))
+        Ok(best)
     }
 
     fn trials(&self, recordings: &[Recording], settings: FusionSettings) -> Trials {
