@@ -144,12 +144,9 @@ impl GapFiller {
             numbers.resize(end, 0.0);
             part.load_f64(Isa::detect(), 0, &mut numbers[begin..]);
         }
-        for index in begin..end {
-            let is_there = self.numbers.iter().all(|part| part[index].is_finite());
-            self.known.push(if is_there { Known::There } else { Known::Missing });
-            if !is_there {
-                self.set(index, 0.0);
-            }
+        self.known.resize(end, Known::There);
+        if !parts.iter().all(|part| part.is_finite(0..frames)) {
+            (begin..end).for_each(|index| self.find_missing(index));
         }
         self.come_out()
     }
@@ -214,19 +211,26 @@ impl GapFiller {
         let reach = self.estimator.reach();
         self.out = (self.known.len() / n).saturating_sub(2 * reach);
         self.costs.begin(self.out);
-        for frame in 0..self.out {
-            let own = (frame + reach) * n..(frame + reach + 1) * n;
-            let is_missing = self.known[own.clone()].contains(&Known::Missing);
-            let snr = is_missing.then(|| self.restore(frame));
-            for (i, index) in own.enumerate() {
-                match snr.filter(|_| self.known[index] == Known::Missing) {
-                    Some(snr) => self.lengthen_gap(frame, i, snr),
-                    None => self.end_gap(self.samples[i].converter),
-                }
-            }
+        let out = &self.known[reach * n..(reach + self.out) * n];
+        if out.contains(&Known::Missing) || self.open().next().is_some() {
+            (0..self.out).for_each(|frame| self.pass(frame));
         }
         self.costs.complete();
         self.out
+    }
+
+    /// Restores a frame that comes out, and follows its gaps.
+    fn pass(&mut self, frame: usize) {
+        let n = self.samples.len();
+        let first = (frame + self.estimator.reach()) * n;
+        let is_missing = self.known[first..first + n].contains(&Known::Missing);
+        let snr = is_missing.then(|| self.restore(frame));
+        for i in 0..n {
+            match snr.filter(|_| self.known[first + i] == Known::Missing) {
+                Some(snr) => self.lengthen_gap(frame, i, snr),
+                None => self.end_gap(self.samples[i].converter),
+            }
+        }
     }
 
     /// Replaces the missing samples of a frame that comes out; returns the predicted ratio of its outputs.
@@ -267,8 +271,12 @@ impl GapFiller {
         samples.zip(weights).map(|((x, offset), weight)| weight * (x - offset)).sum()
     }
 
-    fn set(&mut self, index: usize, value: f64) {
-        self.numbers.iter_mut().for_each(|numbers| numbers[index] = value);
+    /// Notes whether a sample is missing; its weights are 0, so it has to be a number.
+    fn find_missing(&mut self, index: usize) {
+        if !self.numbers.iter().all(|part| part[index].is_finite()) {
+            self.known[index] = Known::Missing;
+            self.numbers.iter_mut().for_each(|part| part[index] = 0.0);
+        }
     }
 
     /// Counts sample i of a frame that comes out.
