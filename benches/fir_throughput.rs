@@ -173,7 +173,7 @@ impl Table {
         self.row(name, m * FRAMES, (n * taps) as f64 / m as f64, || {
             let frames = PcmFrames { layout, channels: n, bytes: black_box(&bytes) };
             let mut output = PcmOutput::packed(PcmFormat::S16Le, &mut out);
-            stream.run(&[frames].as_slice(), &mut output).unwrap();
+            stream.run(&frames, &mut output).unwrap();
         });
     }
 

@@ -35,8 +35,8 @@ fn tail(stream: &Stream) -> usize {
 /// Frames of 16-bit samples as bytes.
 fn process_int16(stream: &mut Stream, input: &[u8], output: &mut [u8]) -> Result<usize, String> {
     let layout = SampleLayout::packed(INT16);
-    let input = [PcmFrames { layout, channels: stream.channels(), bytes: input }];
-    stream.run(&input.as_slice(), &mut PcmOutput::packed(INT16, output)).map_err(|error| error.to_string())
+    let input = PcmFrames { layout, channels: stream.channels(), bytes: input };
+    stream.run(&input, &mut PcmOutput::packed(INT16, output)).map_err(|error| error.to_string())
 }
 
 thread_local! {

@@ -22,7 +22,7 @@
 //! let layout = SampleLayout::packed(PcmFormat::F32Le);
 //! let recording = PcmFrames { layout, channels: 2, bytes: &frames };
 //! let mut again = [0; 12];
-//! Stream::new(&plan).run(&[recording].as_slice(), &mut PcmOutput::packed(PcmFormat::S16Le, &mut again))?;
+//! Stream::new(&plan).run(&recording, &mut PcmOutput::packed(PcmFormat::S16Le, &mut again))?;
 //! assert_eq!(again, bytes);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -53,7 +53,7 @@ mod stream;
 #[cfg(test)]
 mod tests;
 
-pub use adapters::{Frames, Halves, Input, Interleaved, Output, PcmOutput, Planar, SplitOutput, Zeros};
+pub use adapters::{Frames, Halves, Input, Interleaved, Output, PcmOutput, Planar, SideBySide, SplitOutput, Zeros};
 pub use algorithms::choice::{Algorithm, ParseAlgorithmError, Precision};
 pub use algorithms::recursive::{DelayLines, DelayedInput, StateSpace};
 pub use error::{BuildError, ProcessError, StateError};

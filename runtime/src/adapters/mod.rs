@@ -2,17 +2,19 @@
 //! type.
 //!
 //! A stream takes any [`Input`] and gives to any [`Output`]; those here are [`Interleaved`] and [`Planar`]
-//! samples in memory, recordings as they lie in files ([`PcmFrames`](crate::PcmFrames)), [`Zeros`], slices
-//! of samples and [`PcmOutput`](crate::PcmOutput). The kernels' blocks are converted one by one, so that no
+//! samples in memory, recordings as they lie in files ([`PcmFrames`](crate::PcmFrames)), several inputs
+//! [`SideBySide`], [`Zeros`], slices of samples and [`PcmOutput`](crate::PcmOutput). The kernels' blocks are converted one by one, so that no
 //! adapter needs memory of its own.
 
 mod in_memory;
 mod offsets;
 mod pcm;
+mod side_by_side;
 
 pub use in_memory::{Interleaved, Planar};
 pub(crate) use offsets::{Offsets, WithoutOffsets};
 pub use pcm::PcmOutput;
+pub use side_by_side::SideBySide;
 
 use crate::sample::{same, same_mut};
 use crate::{Isa, Sample};

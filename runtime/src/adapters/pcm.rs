@@ -1,6 +1,6 @@
 //! Recordings as they lie in files and pipes.
 
-use super::{Halves, Input, MOST_ROWS, Output, SCRATCH, SplitOutput, convert, interleave_rows};
+use super::{Halves, Input, Output, SCRATCH, SplitOutput, convert};
 use crate::pcm::for_pcm_format;
 use crate::simd::{decode, encode};
 use crate::{Isa, PcmFormat, PcmFrames, Sample, SampleLayout};
@@ -59,14 +59,13 @@ fn is_native<T: Sample>(layout: SampleLayout) -> bool {
     layout == SampleLayout::packed(format.native())
 }
 
-/// Several recordings side by side: their channels follow each other.
-impl Input for &[PcmFrames<'_>] {
+impl Input for PcmFrames<'_> {
     fn channels(&self) -> usize {
-        self.iter().map(|recording| recording.channels).sum()
+        self.channels
     }
 
     fn frames(&self) -> usize {
-        self.iter().map(PcmFrames::frames).min().unwrap_or(0)
+        self.frames()
     }
 
     fn in_memory_f32(&self) -> Option<&[f32]> {
@@ -78,20 +77,18 @@ impl Input for &[PcmFrames<'_>] {
     }
 
     fn is_finite(&self, frames: Range<usize>) -> bool {
-        self.iter().all(|recording| recording.range(frames.clone()).is_finite())
+        self.range(frames).is_finite()
     }
 
     fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {
-        let n = self.channels();
-        match self {
-            [alone] => load_recording(isa, alone, first, samples),
-            many if n <= MOST_ROWS && many.iter().all(|recording| recording.channels == 1) => {
-                interleave_rows(isa, n, samples, |i, start, row| {
-                    load_recording(isa, &many[i], first + start, row);
-                });
-            }
-            many => load_each(many, first, samples),
-        }
+        let done = if self.layout.is_packed() {
+            decode(isa, self.layout.format, &self.bytes[first * self.frame_bytes()..], samples)
+        } else {
+            0
+        };
+        // Whole frames only; the rest one by one.
+        let done = done / self.channels;
+        load_each(self, first + done, &mut samples[done * self.channels..]);
     }
 
     fn load_f64(&self, _: Isa, first: usize, samples: &mut [f64]) {
@@ -99,45 +96,20 @@ impl Input for &[PcmFrames<'_>] {
     }
 }
 
-/// The samples of one recording as they lie in memory, if they are numbers of type `T`.
-fn native<'a, T: Sample>(recordings: &[PcmFrames<'a>]) -> Option<&'a [T]> {
-    let [alone] = recordings else { return None };
-    let whole = alone.bytes.len() / alone.frame_bytes() * alone.frame_bytes();
-    is_native::<T>(alone.layout).then(|| bytemuck::try_cast_slice(&alone.bytes[..whole]).ok()).flatten()
+/// The samples as they lie in memory, if they are numbers of type `T`.
+fn native<'a, T: Sample>(frames: &PcmFrames<'a>) -> Option<&'a [T]> {
+    let whole = frames.bytes.len() / frames.frame_bytes() * frames.frame_bytes();
+    is_native::<T>(frames.layout).then(|| bytemuck::try_cast_slice(&frames.bytes[..whole]).ok()).flatten()
 }
 
-/// All channels from one recording.
-fn load_recording(isa: Isa, recording: &PcmFrames<'_>, first: usize, samples: &mut [f32]) {
-    let PcmFrames { layout, channels, bytes } = *recording;
-    let done = if layout.is_packed() {
-        decode(isa, layout.format, &bytes[first * recording.frame_bytes()..], samples)
-    } else {
-        0
-    };
-    // Whole frames only; the rest one by one.
-    let done = done / channels;
-    load_columns(recording, first + done, channels, &mut samples[done * channels..]);
-}
-
-/// Any recordings, sample by sample.
-fn load_each<T: Sample>(recordings: &[PcmFrames<'_>], first: usize, samples: &mut [T]) {
-    let n = recordings.iter().map(|recording| recording.channels).sum();
-    let mut offset = 0;
-    for recording in recordings {
-        load_columns(recording, first, n, &mut samples[offset..]);
-        offset += recording.channels;
-    }
-}
-
-/// The channels of a recording to the first columns of frames of `n` samples (the last
-/// frame may end after them).
-fn load_columns<T: Sample>(recording: &PcmFrames<'_>, first: usize, n: usize, samples: &mut [T]) {
-    let container = recording.layout.container;
+/// Frame by frame.
+fn load_each<T: Sample>(frames: &PcmFrames<'_>, first: usize, samples: &mut [T]) {
+    let container = frames.layout.container;
     // The last sample may end before its container does.
-    let bytes = recording.bytes.chunks(recording.frame_bytes()).skip(first);
-    for_pcm_format!(recording.layout.format, FORMAT => {
-        for (frame, bytes) in samples.chunks_mut(n).zip(bytes) {
-            for (i, slot) in frame[..recording.channels].iter_mut().enumerate() {
+    let bytes = frames.bytes.chunks(frames.frame_bytes()).skip(first);
+    for_pcm_format!(frames.layout.format, FORMAT => {
+        for (frame, bytes) in samples.chunks_exact_mut(frames.channels).zip(bytes) {
+            for (i, slot) in frame.iter_mut().enumerate() {
                 *slot = T::from_f64(FORMAT.decode(&bytes[i * container..]));
             }
         }

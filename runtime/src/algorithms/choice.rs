@@ -65,8 +65,11 @@ pub enum Precision {
 impl Precision {
     /// For samples of a format: those with more digits than f32 need sums in f64.
     pub fn of(format: PcmFormat) -> Self {
-        use PcmFormat::{F64Be, F64Le, S32Be, S32Le};
-        if matches!(format, F64Be | F64Le | S32Be | S32Le) { Self::Double } else { Self::Single }
+        if format.bytes() == 8 || (format.bytes() == 4 && !format.is_float()) {
+            Self::Double
+        } else {
+            Self::Single
+        }
     }
 
     /// Numbers of a lane group.

@@ -81,6 +81,8 @@ impl<'a> PcmFrames<'a> {
             PcmFormat::F32Be => all_finite(self.bytes, |b| u32::from_be_bytes(b) << 1 < 0xFF00_0000),
             PcmFormat::F64Le => all_finite(self.bytes, |b| u64::from_le_bytes(b) << 1 < 0xFFE0 << 48),
             PcmFormat::F64Be => all_finite(self.bytes, |b| u64::from_be_bytes(b) << 1 < 0xFFE0 << 48),
+            PcmFormat::F16Le => all_finite(self.bytes, |b| u16::from_le_bytes(b) << 1 < 0xF800),
+            PcmFormat::F16Be => all_finite(self.bytes, |b| u16::from_be_bytes(b) << 1 < 0xF800),
             _ => true,
         }
     }

@@ -1,6 +1,7 @@
 //! Sample formats: names as in ffmpeg, and the conversions between bytes and numbers.
 //!
-//! Integers of b bits map to x = i / 2^(b-1), so that full scale is 1.0; `u8` is offset by 128.
+//! Integers of b bits map to x = i / 2^(b-1), so that full scale is 1.0; `u8`, `u16le`.. are offset by
+//! half their range.
 //! Numbers map back by rounding to the nearest integer (ties to even) and saturating.
 
 mod frames;
@@ -40,6 +41,22 @@ pub enum PcmFormat {
     S32Le,
     /// Signed 32 bit, big endian.
     S32Be,
+    /// Unsigned 16 bit, 2^15 is zero, little endian.
+    U16Le,
+    /// Unsigned 16 bit, 2^15 is zero, big endian.
+    U16Be,
+    /// Unsigned 32 bit, 2^31 is zero, little endian.
+    U32Le,
+    /// Unsigned 32 bit, 2^31 is zero, big endian.
+    U32Be,
+    /// Signed 64 bit, little endian.
+    S64Le,
+    /// Signed 64 bit, big endian.
+    S64Be,
+    /// 16-bit float, little endian.
+    F16Le,
+    /// 16-bit float, big endian.
+    F16Be,
     /// 32-bit float, little endian.
     F32Le,
     /// 32-bit float, big endian.
@@ -51,17 +68,19 @@ pub enum PcmFormat {
 }
 
 /// The names of [`PcmFormat::ALL`].
-const NAMES: [&str; 12] =
-    ["s8", "u8", "s16le", "s16be", "s24le", "s24be", "s32le", "s32be", "f32le", "f32be", "f64le", "f64be"];
+const NAMES: [&str; 20] = [
+    "s8", "u8", "s16le", "s16be", "s24le", "s24be", "s32le", "s32be", "u16le", "u16be", "u32le", "u32be", "s64le",
+    "s64be", "f16le", "f16be", "f32le", "f32be", "f64le", "f64be",
+];
 
-/// A format name that is not one of the twelve.
+/// A name of no format.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("unknown sample format `{0}`; use one of {names}", names = NAMES.join(" "))]
 pub struct ParsePcmFormatError(pub String);
 
 impl PcmFormat {
     /// All formats, in the order of the contract.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 20] = [
         Self::S8,
         Self::U8,
         Self::S16Le,
@@ -70,6 +89,14 @@ impl PcmFormat {
         Self::S24Be,
         Self::S32Le,
         Self::S32Be,
+        Self::U16Le,
+        Self::U16Be,
+        Self::U32Le,
+        Self::U32Be,
+        Self::S64Le,
+        Self::S64Be,
+        Self::F16Le,
+        Self::F16Be,
         Self::F32Le,
         Self::F32Be,
         Self::F64Le,
@@ -85,16 +112,24 @@ impl PcmFormat {
     pub const fn bytes(self) -> usize {
         match self {
             Self::S8 | Self::U8 => 1,
-            Self::S16Le | Self::S16Be => 2,
+            Self::S16Le | Self::S16Be | Self::U16Le | Self::U16Be | Self::F16Le | Self::F16Be => 2,
             Self::S24Le | Self::S24Be => 3,
-            Self::S32Le | Self::S32Be | Self::F32Le | Self::F32Be => 4,
-            Self::F64Le | Self::F64Be => 8,
+            Self::S32Le | Self::S32Be | Self::U32Le | Self::U32Be | Self::F32Le | Self::F32Be => 4,
+            Self::S64Le | Self::S64Be | Self::F64Le | Self::F64Be => 8,
         }
     }
 
-    /// True for the four float formats: they do not saturate, and they can hold NaN.
+    /// True for floats: they do not saturate, and they can hold NaN.
     pub const fn is_float(self) -> bool {
-        matches!(self, Self::F32Le | Self::F32Be | Self::F64Le | Self::F64Be)
+        matches!(
+            self,
+            Self::F16Le | Self::F16Be | Self::F32Le | Self::F32Be | Self::F64Le | Self::F64Be
+        )
+    }
+
+    /// True for integers that count from 0, whose middle is zero (offset binary).
+    pub const fn is_unsigned(self) -> bool {
+        matches!(self, Self::U8 | Self::U16Le | Self::U16Be | Self::U32Le | Self::U32Be)
     }
 
     /// The number in the first [`Self::bytes`] bytes.
@@ -108,7 +143,10 @@ impl PcmFormat {
             Self::F32Be => f64::from(f32::from_be_bytes(first(bytes))),
             Self::F64Le => f64::from_le_bytes(first(bytes)),
             Self::F64Be => f64::from_be_bytes(first(bytes)),
-            Self::U8 => (f64::from(bytes[0]) - 128.0) / 128.0,
+            Self::F16Le => half::f16::from_le_bytes(first(bytes)).to_f64(),
+            Self::F16Be => half::f16::from_be_bytes(first(bytes)).to_f64(),
+            Self::S64Le => i64::from_le_bytes(first(bytes)) as f64 / 2f64.powi(63),
+            Self::S64Be => i64::from_be_bytes(first(bytes)) as f64 / 2f64.powi(63),
             // Integers fill the upper bytes of 32 bits.
             _ => {
                 let (mut word, size) = ([0; 4], self.bytes());
@@ -117,6 +155,9 @@ impl PcmFormat {
                     word.reverse();
                 } else {
                     word[4 - size..].copy_from_slice(&bytes[..size]);
+                }
+                if self.is_unsigned() {
+                    word[3] ^= SIGN;
                 }
                 f64::from(i32::from_le_bytes(word)) / 2147483648.0
             }
@@ -134,11 +175,15 @@ impl PcmFormat {
             Self::F32Be => store(bytes, (value as f32).to_be_bytes()),
             Self::F64Le => store(bytes, value.to_le_bytes()),
             Self::F64Be => store(bytes, value.to_be_bytes()),
+            Self::F16Le => store(bytes, half::f16::from_f64(value).to_le_bytes()),
+            Self::F16Be => store(bytes, half::f16::from_f64(value).to_be_bytes()),
             _ => {
                 let size = self.bytes();
                 let (i, clipped) = quantise(value, 8 * size as u32 - 1);
-                let word = if self == Self::U8 { i + 128 } else { i }.to_le_bytes();
-                bytes[..size].copy_from_slice(&word[..size]);
+                bytes[..size].copy_from_slice(&i.to_le_bytes()[..size]);
+                if self.is_unsigned() {
+                    bytes[size - 1] ^= SIGN;
+                }
                 if self.is_big_endian() {
                     bytes[..size].reverse();
                 }
@@ -157,7 +202,8 @@ impl PcmFormat {
     }
 
     const fn is_big_endian(self) -> bool {
-        matches!(self, Self::S16Be | Self::S24Be | Self::S32Be | Self::F32Be | Self::F64Be)
+        // In pairs after those of one byte, the little-endian one first.
+        self as usize >= 2 && self as usize % 2 == 1
     }
 }
 
@@ -165,7 +211,8 @@ impl PcmFormat {
 macro_rules! for_pcm_format {
     ($format:expr, $constant:ident => $body:expr) => {
         $crate::pcm::for_pcm_format!(@ $format, $constant => $body;
-            S8 U8 S16Le S16Be S24Le S24Be S32Le S32Be F32Le F32Be F64Le F64Be)
+            S8 U8 S16Le S16Be S24Le S24Be S32Le S32Be U16Le U16Be U32Le U32Be S64Le S64Be F16Le F16Be
+            F32Le F32Be F64Le F64Be)
     };
     (@ $format:expr, $constant:ident => $body:expr; $($name:ident)*) => {
         match $format {
@@ -195,13 +242,15 @@ impl FromStr for PcmFormat {
 
 /// Nearest integer of `value * 2^bits` and whether it had to be clipped to the range.
 #[inline(always)]
-fn quantise(value: f64, bits: u32) -> (i32, bool) {
-    let full = f64::from(1u32 << bits);
+fn quantise(value: f64, bits: u32) -> (i64, bool) {
+    let full = (1u64 << bits) as f64;
     let scaled = (value * full).round_ties_even();
-    let clipped = scaled < -full || scaled > full - 1.0;
-    // NaN comes out of a filter only where its sums overflow; the cast makes it 0.
-    (scaled.clamp(-full, full - 1.0) as i32, clipped)
+    // NaN comes out of a filter only where its sums overflow; the cast makes it 0, and saturates at 2^63.
+    (scaled.clamp(-full, full - 1.0) as i64, scaled < -full || scaled >= full)
 }
+
+/// The bit of the sign in the most significant byte: where it is turned, integers count from 0.
+const SIGN: u8 = 0x80;
 
 /// The first bytes.
 #[inline(always)]
@@ -237,7 +286,8 @@ mod tests {
 
     #[test]
     fn every_integer_of_every_short_format_survives() {
-        for format in [PcmFormat::S8, PcmFormat::U8, PcmFormat::S16Le, PcmFormat::S16Be] {
+        use PcmFormat::{S8, S16Be, S16Le, U8, U16Be, U16Le};
+        for format in [S8, U8, S16Le, S16Be, U16Le, U16Be] {
             for code in 0..1u32 << (8 * format.bytes()) {
                 let bytes = &code.to_le_bytes()[..format.bytes()];
                 assert_eq!(bytes_of(format, format.decode(bytes)), (bytes.to_vec(), false), "{format}");
@@ -247,13 +297,45 @@ mod tests {
 
     #[test]
     fn long_formats_survive_at_the_edges() {
-        for format in [PcmFormat::S24Le, PcmFormat::S24Be, PcmFormat::S32Le, PcmFormat::S32Be] {
+        use PcmFormat::{S24Be, S24Le, S32Be, S32Le, U32Be, U32Le};
+        for format in [S24Le, S24Be, S32Le, S32Be, U32Le, U32Be] {
             for pattern in [[0x80, 0, 0, 0], [0x7f, 0xff, 0xff, 0xff], [0, 0, 0, 1], [0xff; 4], [1, 2, 3, 4]]
             {
                 let bytes = &pattern[..format.bytes()];
                 assert_eq!(bytes_of(format, format.decode(bytes)), (bytes.to_vec(), false), "{format}");
             }
         }
+    }
+
+    #[test]
+    fn integers_of_64_bits_keep_53() {
+        for code in [0, 1, -1, 1 << 52, -(1 << 53), 5 << 60, i64::MIN] {
+            assert_eq!(PcmFormat::S64Be.decode(&code.to_be_bytes()) * 2f64.powi(63), code as f64);
+            assert_eq!(bytes_of(PcmFormat::S64Le, code as f64 / 2f64.powi(63)), (code.to_le_bytes().to_vec(), false));
+        }
+        assert_eq!(bytes_of(PcmFormat::S64Le, 1.0), (i64::MAX.to_le_bytes().to_vec(), true));
+    }
+
+    #[test]
+    fn half_floats_survive() {
+        for format in [PcmFormat::F16Le, PcmFormat::F16Be] {
+            for code in 0..=u16::MAX {
+                let bytes = code.to_le_bytes();
+                let value = format.decode(&bytes);
+                assert!(value.is_nan() || bytes_of(format, value).0 == bytes, "{format} {code}");
+            }
+        }
+        assert_eq!(PcmFormat::F16Le.decode(&[0x00, 0x3C]), 1.0);
+    }
+
+    #[test]
+    fn offset_binary_begins_at_the_lowest_code() {
+        let ends = [PcmFormat::U16Le, PcmFormat::U32Be].map(|format| {
+            let word = [[0; 4], [0x80; 4], [0xFF; 4]];
+            word.map(|bytes| format.decode(&bytes))
+        });
+        assert_eq!(ends[0], [-1.0, 128.0 / 32768.0, 32767.0 / 32768.0]);
+        assert_eq!((ends[1][0], ends[1][2]), (-1.0, 1.0 - 2f64.powi(-31)));
     }
 
     #[test]

@@ -146,7 +146,7 @@ fn bytes_that_are_not_finite_become_zero_and_are_counted() {
     let mut out = vec![0; 20];
     let layout = SampleLayout::packed(PcmFormat::F32Le);
     let mut output = PcmOutput::packed(PcmFormat::F32Le, &mut out);
-    stream.run(&[PcmFrames { layout, channels: 1, bytes: &bytes }].as_slice(), &mut output).unwrap();
+    stream.run(&PcmFrames { layout, channels: 1, bytes: &bytes }, &mut output).unwrap();
     assert_eq!(stream.replaced(), 3);
     assert_eq!(out, [1f32, 0.0, 0.0, 0.0, 2.0].map(f32::to_le_bytes).concat());
 }
@@ -160,6 +160,6 @@ fn what_is_clipped_is_counted_once_also_beside_what_is_not_finite() {
     let mut out = [0; 200];
     let mut output = PcmOutput::packed(PcmFormat::S16Le, &mut out);
     let frames = PcmFrames { layout: SampleLayout::packed(PcmFormat::F32Le), channels: 1, bytes: &bytes };
-    stream.run(&[frames].as_slice(), &mut output).unwrap();
+    stream.run(&frames, &mut output).unwrap();
     assert_eq!((output.clipped, stream.replaced()), (1, 2));
 }

@@ -1,7 +1,7 @@
 //! Samples as they lie in files give what the same samples in memory give.
 
 use super::support::{Bank, FIR_ALGORITHMS, Noise, by, fir_bank, random_taps, start};
-use crate::{Options, PcmFormat, PcmFrames, PcmOutput, SampleLayout};
+use crate::{Input, Options, PcmFormat, PcmFrames, PcmOutput, SampleLayout, SideBySide};
 use proptest::prelude::*;
 
 /// Random samples of a format.
@@ -39,11 +39,12 @@ fn check_bytes(bank: &Bank, options: Options, [from, to]: [PcmFormat; 2], bytes:
     let layout = SampleLayout::packed(from);
     let columns = columns(bytes, n, from.bytes());
     let planar: Vec<_> = columns.iter().map(|bytes| PcmFrames { layout, channels: 1, bytes }).collect();
-    for recordings in [&[PcmFrames { layout, channels: n, bytes }][..], &planar] {
+    let one = PcmFrames { layout, channels: n, bytes };
+    for recordings in [&one as &dyn Input, &SideBySide(&planar)] {
         stream.reset();
         let mut out = vec![0; want.0.len()];
         let mut output = PcmOutput::packed(to, &mut out);
-        assert_eq!(stream.run(&recordings, &mut output), Ok(samples.len()));
+        assert_eq!(stream.run(recordings, &mut output), Ok(samples.len()));
         let clipped = output.clipped;
         assert!((out, clipped) == want, "{from} to {to}, {:?}", options.algorithm);
     }
@@ -54,7 +55,7 @@ proptest! {
 
     #[test]
     fn bytes_in_any_format_give_the_same_samples(
-        n in 1usize..5, m in 1usize..5, from in 0usize..12, to in 0usize..12, seed: u64, frames in 0usize..900,
+        n in 1usize..5, m in 1usize..5, from in 0usize..20, to in 0usize..20, seed: u64, frames in 0usize..900,
     ) {
         let formats = [from, to].map(|which| PcmFormat::ALL[which]);
         let mut noise = Noise(seed);

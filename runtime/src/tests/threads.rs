@@ -2,7 +2,7 @@
 
 use super::support::{Bank, Noise, by, fir_bank, precise, random_taps, rotation_bank, start};
 use crate::{
-    Algorithm, Interleaved, Options, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, Stream,
+    Algorithm, Interleaved, Options, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, SideBySide, Stream,
     ThreadPool,
 };
 
@@ -101,8 +101,8 @@ fn threads_do_not_change_a_byte() {
         let mut want = PcmOutput::packed(out_format, want);
         let mut got = PcmOutput::packed(out_format, got);
         (want.clipped, got.clipped) = (5, 5);
-        one.run(&frames.as_slice(), &mut want).unwrap();
-        many.run_parallel(&frames.as_slice(), &mut got, &pools).unwrap();
+        one.run(&SideBySide(&frames), &mut want).unwrap();
+        many.run_parallel(&SideBySide(&frames), &mut got, &pools).unwrap();
         assert_eq!(want.clipped, got.clipped);
         assert!(want.clipped > 5 || out_format == PcmFormat::F64Le);
         assert!(want.bytes == got.bytes, "{format} to {out_format}");

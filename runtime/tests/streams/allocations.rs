@@ -2,7 +2,7 @@
 //! of the samples.
 
 use hybank_runtime::{
-    Algorithm, Input, Interleaved, Options, Output, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision,
+    Algorithm, Input, Interleaved, Options, Output, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision, SideBySide,
     SampleLayout, Shape, StateSpace, Stream, Zeros,
 };
 
@@ -113,7 +113,7 @@ fn samples_as_they_lie_in_files() {
                 let recordings = vec![PcmFrames { layout, channels, bytes }; n / channels];
                 let mut output = PcmOutput::packed(to, &mut out);
                 let form = format!("{from} to {to}");
-                let written = quiet(&plan, &form, || stream.run(&recordings.as_slice(), &mut output));
+                let written = quiet(&plan, &form, || stream.run(&SideBySide(&recordings), &mut output));
                 assert_eq!(written, Ok(frames * M));
             }
         }

@@ -1,16 +1,16 @@
 //! Packed floats of this machine's byte order are read and written where they lie; all others are converted.
 
-use hybank_runtime::{Input, Isa, Output, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout};
+use hybank_runtime::{Input, Isa, Output, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, SideBySide};
 
 const NATIVE: PcmFormat = PcmFormat::F32Le.native();
 const FOREIGN: PcmFormat = if cfg!(target_endian = "big") { PcmFormat::F32Le } else { PcmFormat::F32Be };
 
-fn frames(format: PcmFormat, channels: usize, bytes: &[u8]) -> [PcmFrames<'_>; 1] {
-    [PcmFrames { layout: SampleLayout::packed(format), channels, bytes }]
+fn frames(format: PcmFormat, channels: usize, bytes: &[u8]) -> PcmFrames<'_> {
+    PcmFrames { layout: SampleLayout::packed(format), channels, bytes }
 }
 
-fn loaded(frames: &[PcmFrames<'_>]) -> Vec<f32> {
-    let mut samples = vec![0.0; frames.frames() * frames.channels()];
+fn loaded(frames: &PcmFrames<'_>) -> Vec<f32> {
+    let mut samples = vec![0.0; frames.frames() * frames.channels];
     frames.load_f32(Isa::detect(), 0, &mut samples);
     samples
 }
@@ -21,17 +21,17 @@ fn frames_are_read_where_they_lie() {
     let bytes: &[u8] = bytemuck::cast_slice(&numbers);
     let whole = frames(NATIVE, 2, bytes);
     // The last sample is no frame.
-    assert_eq!(whole.as_slice().in_memory_f32().unwrap(), &numbers[..4]);
-    assert_eq!(whole.as_slice().in_memory_f32().unwrap().as_ptr(), numbers.as_ptr());
-    assert_eq!(whole.as_slice().in_memory_f32().unwrap(), loaded(&whole));
+    assert_eq!(whole.in_memory_f32().unwrap(), &numbers[..4]);
+    assert_eq!(whole.in_memory_f32().unwrap().as_ptr(), numbers.as_ptr());
+    assert_eq!(whole.in_memory_f32().unwrap(), loaded(&whole));
     for apart in
         [frames(FOREIGN, 2, bytes), frames(NATIVE, 2, &bytes[1..]), frames(PcmFormat::S16Le, 2, bytes)]
     {
-        assert!(apart.as_slice().in_memory_f32().is_none());
+        assert!(apart.in_memory_f32().is_none());
     }
-    assert!(whole.as_slice().in_memory_f64().is_none());
-    assert!([whole[0], whole[0]].as_slice().in_memory_f32().is_none());
-    assert!([whole[0].part(1)].as_slice().in_memory_f32().is_none());
+    assert!(whole.in_memory_f64().is_none());
+    assert!(SideBySide(&[whole, whole]).in_memory_f32().is_none());
+    assert!(whole.part(1).in_memory_f32().is_none());
 }
 
 #[test]

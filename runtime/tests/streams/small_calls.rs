@@ -119,7 +119,7 @@ fn pcm_follows_the_samples_in_memory() {
         let mut out = vec![0; expected.len()];
         let mut output = PcmOutput::packed(format, &mut out);
         let frames = PcmFrames { layout: SampleLayout::packed(format), channels: 3, bytes: &bytes };
-        Stream::new(&plan).run(&[frames].as_slice(), &mut output).unwrap();
+        Stream::new(&plan).run(&frames, &mut output).unwrap();
         assert_eq!(out, expected, "{format}");
     }
 }

@@ -1,0 +1,76 @@
+//! Several inputs side by side.
+
+use super::{Input, MOST_ROWS, SCRATCH, interleave_rows};
+use crate::{Isa, Sample};
+use std::ops::Range;
+
+/// Inputs whose channels follow each other; frames are those that all of them have.
+#[derive(Debug, Clone, Copy)]
+pub struct SideBySide<'a, I>(pub &'a [I]);
+
+impl<I: Input> Input for SideBySide<'_, I> {
+    fn channels(&self) -> usize {
+        self.0.iter().map(Input::channels).sum()
+    }
+
+    fn frames(&self) -> usize {
+        self.0.iter().map(Input::frames).min().unwrap_or(0)
+    }
+
+    fn in_memory_f32(&self) -> Option<&[f32]> {
+        if let [alone] = self.0 { alone.in_memory_f32() } else { None }
+    }
+
+    fn in_memory_f64(&self) -> Option<&[f64]> {
+        if let [alone] = self.0 { alone.in_memory_f64() } else { None }
+    }
+
+    fn is_finite(&self, frames: Range<usize>) -> bool {
+        self.0.iter().all(|input| input.is_finite(frames.clone()))
+    }
+
+    fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {
+        match self.0 {
+            [alone] => alone.load_f32(isa, first, samples),
+            many if many.len() <= MOST_ROWS && many.iter().all(|input| input.channels() == 1) => {
+                interleave_rows(isa, many.len(), samples, |i, start, row| {
+                    many[i].load_f32(isa, first + start, row);
+                });
+            }
+            many => load_each(many, isa, first, samples),
+        }
+    }
+
+    fn load_f64(&self, isa: Isa, first: usize, samples: &mut [f64]) {
+        match self.0 {
+            [alone] => alone.load_f64(isa, first, samples),
+            many => load_each(many, isa, first, samples),
+        }
+    }
+}
+
+/// One input after the other, each to its columns of the frames.
+fn load_each<T: Sample>(inputs: &[impl Input], isa: Isa, first: usize, samples: &mut [T]) {
+    let n: usize = inputs.iter().map(Input::channels).sum();
+    let frames = samples.len() / n.max(1);
+    let (mut scratch, mut wide) = ([T::default(); SCRATCH], Vec::new());
+    let mut column = 0;
+    for input in inputs {
+        let channels = input.channels();
+        // Only frames of more samples than the scratch holds need memory.
+        if channels > SCRATCH {
+            wide.resize(channels, T::default());
+        }
+        let room = if channels > SCRATCH { &mut wide[..] } else { &mut scratch[..] };
+        let step = (room.len() / channels.max(1)).max(1);
+        for start in (0..frames).step_by(step) {
+            let loaded = &mut room[..step.min(frames - start) * channels];
+            (input as &dyn Input).load(isa, first + start, loaded);
+            let slots = samples[start * n..].chunks_exact_mut(n);
+            for (frame, loaded) in slots.zip(loaded.chunks_exact(channels.max(1))) {
+                frame[column..column + channels].copy_from_slice(loaded);
+            }
+        }
+        column += channels;
+    }
+}
