@@ -53,7 +53,9 @@ mod stream;
 #[cfg(test)]
 mod tests;
 
-pub use adapters::{Frames, Halves, Input, Interleaved, Output, PcmOutput, Planar, SideBySide, SplitOutput, Zeros};
+pub use adapters::{
+    Frames, Halves, Input, Interleaved, Output, PcmOutput, Planar, SideBySide, SplitOutput, Zeros,
+};
 pub use algorithms::choice::{Algorithm, ParseAlgorithmError, Precision};
 pub use algorithms::recursive::{DelayLines, DelayedInput, StateSpace};
 pub use error::{BuildError, ProcessError, StateError};

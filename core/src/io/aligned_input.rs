@@ -1,42 +1,21 @@
-//! One input for the consumer: frames in the order of time, with NaN for lost frames.
-//!
-//! Frames are copied only where samples are lost; otherwise they refer to the block that was read.
+//! One input for the consumer: frames in the order of time, with NaN for lost samples.
 
+use super::StreamHeader;
+use super::block::{Block, RecordedFrames};
 use super::lost::{Dropout, LostInInput};
 use super::timestamps::Break;
-use super::{PcmFormat, PcmFrames, SampleLayout, StreamHeader};
 use std::collections::VecDeque;
 
 /// Lost frames that are handed out at a time, at most: few enough for the cache, so that a long gap takes no
 /// memory.
 const LOST_FRAMES: usize = 1024;
 
-/// Bytes that were read, whole frames.
-#[derive(Debug, Default)]
-pub(super) struct Block {
-    pub(super) bytes: Vec<u8>,
-    pub(super) filled: usize,
-}
-
-/// The kind of the next frames.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum View {
-    /// Those of the block.
-    Read,
-    /// Those of the block, some channels invalid.
-    Dropouts,
-    /// Lost; the position in the block does not change.
-    Lost,
-    /// Lost, since the input is over.
-    Over,
-}
-
 /// The input's frames in the order of time.
 #[derive(Debug)]
 pub(super) struct AlignedInput {
     pub(super) header: StreamHeader,
     block: Block,
-    /// Bytes of the block that are used up.
+    /// Frames of the block that are used up.
     used: usize,
     /// No block will follow.
     ended: bool,
@@ -45,9 +24,8 @@ pub(super) struct AlignedInput {
     dropouts: Dropouts,
     /// Frames of the input that are over.
     frames: u64,
-    view: View,
-    /// Numbers in place of lost or partly invalid frames.
-    numbers: Vec<u8>,
+    /// Frames in place of those that are lost; made when the first one is.
+    lost: Block,
 }
 
 impl AlignedInput {
@@ -60,8 +38,7 @@ impl AlignedInput {
             breaks: VecDeque::new(),
             dropouts: Dropouts::default(),
             frames: 0,
-            view: View::Read,
-            numbers: Vec::new(),
+            lost: Block::default(),
         }
     }
 
@@ -84,7 +61,7 @@ impl AlignedInput {
 
     /// The block, once it is used up.
     pub(super) fn take_used(&mut self) -> Option<Block> {
-        let done = self.left() == 0 && !self.block.bytes.is_empty();
+        let done = self.left() == 0 && !self.block.parts.is_empty();
         done.then(|| self.refill(Block::default()))
     }
 
@@ -103,9 +80,14 @@ impl AlignedInput {
         self.ready() == 0 && self.ended
     }
 
+    /// True if the next frames are lost.
+    fn is_lost(&self) -> bool {
+        self.at_break().is_some() || self.is_over()
+    }
+
     /// Frames of the block that are left.
     pub(super) fn left(&self) -> usize {
-        (self.block.filled - self.used) / self.header.frame_bytes()
+        self.block.frames() - self.used
     }
 
     /// Frames of the input that are used or at hand.
@@ -125,65 +107,50 @@ impl AlignedInput {
             return clamp(lost).min(LOST_FRAMES).min(change);
         }
         let until_break = self.breaks.front().map_or(usize::MAX, |next| clamp(next.frame - self.frames));
-        let most = if self.dropouts.any() { LOST_FRAMES } else { usize::MAX };
-        self.left().min(until_break).min(most).min(change)
+        self.left().min(until_break).min(change)
     }
 
     /// Makes `frames` frames visible: at most those that are ready, or any number once the input is over.
     pub(super) fn prepare(&mut self, frames: usize) {
-        self.view = match self.at_break() {
-            _ if self.is_over() => View::Over,
-            Some(_) => View::Lost,
-            None if self.dropouts.any() => View::Dropouts,
-            None => View::Read,
-        };
-        match self.view {
-            View::Read => {}
-            View::Dropouts => self.decode_with_dropouts(frames),
-            View::Lost | View::Over => {
-                self.numbers.clear();
-                let numbers = frames * self.header.columns();
-                self.numbers.extend(std::iter::repeat_n(f64::NAN.to_le_bytes(), numbers).flatten());
+        if self.is_lost() {
+            if self.lost.frames() < frames {
+                self.lost = Block::missing(&self.header, frames.max(LOST_FRAMES));
             }
+        } else if self.dropouts.any() {
+            let (dropouts, block) = (&self.dropouts, &mut self.block);
+            let invalid = (0..self.header.channels).filter(|channel| dropouts.covers(*channel));
+            invalid.for_each(|channel| block.lose(channel, self.used..self.used + frames));
         }
     }
 
-    /// The prepared frames. Of complex samples each part is a channel.
-    pub(super) fn view(&self, frames: usize) -> PcmFrames<'_> {
-        let channels = self.header.columns();
-        if self.view == View::Read {
-            let bytes = &self.block.bytes[self.used..self.used + frames * self.header.frame_bytes()];
-            return PcmFrames { layout: self.header.layout, channels, bytes };
+    /// The prepared frames. Several samples of each channel in a row may be a frame.
+    pub(super) fn view(&self, frames: usize, per_frame: usize) -> RecordedFrames<'_> {
+        match self.is_lost() {
+            true => self.lost.view(0..frames, per_frame),
+            false => self.block.view(self.used..self.used + frames, per_frame),
         }
-        let layout = SampleLayout::packed(PcmFormat::F64Le);
-        PcmFrames { layout, channels, bytes: &self.numbers[..frames * channels * 8] }
+    }
+
+    /// Appends the prepared frames to another block.
+    pub(super) fn copy_to(&self, begun: &mut Block, frames: usize) {
+        match self.is_lost() {
+            true => begun.append(&self.lost, 0..frames),
+            false => begun.append(&self.block, self.used..self.used + frames),
+        }
     }
 
     /// Advances by `frames` frames.
     pub(super) fn advance(&mut self, frames: usize) {
+        let (is_break, is_over) = (self.at_break().is_some(), self.is_over());
         self.dropouts.advance(frames as u64);
-        match (self.view, self.breaks.front_mut()) {
-            (View::Over, _) => {}
-            (View::Lost, next) => next.into_iter().for_each(|next| next.lost -= frames as u64),
-            (View::Read | View::Dropouts, _) => {
-                self.used += frames * self.header.frame_bytes();
-                self.frames += frames as u64;
-            }
+        if is_break {
+            self.breaks.front_mut().into_iter().for_each(|next| next.lost -= frames as u64);
+        } else if !is_over {
+            self.used += frames;
+            self.frames += frames as u64;
         }
         while self.at_break().is_some_and(|next| next.lost == 0) {
             self.breaks.pop_front();
-        }
-    }
-
-    fn decode_with_dropouts(&mut self, frames: usize) {
-        let StreamHeader { layout, .. } = self.header;
-        let (columns, parts) = (self.header.columns(), self.header.parts());
-        let bytes = &self.block.bytes[self.used..self.used + frames * self.header.frame_bytes()];
-        self.numbers.clear();
-        for (index, sample) in bytes.chunks_exact(layout.container).enumerate() {
-            let invalid = self.dropouts.covers(index % columns / parts);
-            let value = if invalid { f64::NAN } else { layout.format.decode(sample) };
-            self.numbers.extend(value.to_le_bytes());
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Captures as arrays of numbers, NumPy's and MATLAB's. Of two axes the shorter one holds the channels, and
 //! the rows do if both are equal: `(N, T)` as the Python package has it, `(T, N)` as sound files have it.
 
-use super::capture::{Blocks, Capture};
+use super::capture::{Blocks, ByteSource};
 use super::stream_header::MOST_CHANNELS;
 use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
 use crate::messages::Quoted;
@@ -136,7 +136,7 @@ fn check_length(file: &mut impl Seek, wanted: u64) -> Result<(), String> {
     }
 }
 
-impl<R: Read + Seek> Capture for ArrayReader<R> {
+impl<R: Read + Seek> ByteSource for ArrayReader<R> {
     fn stream_header(&self) -> StreamHeader {
         self.header
     }

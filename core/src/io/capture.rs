@@ -1,16 +1,43 @@
-//! What every kind of input is: a header, and the bytes of interleaved frames.
+//! What every kind of input is: a header, and interleaved frames.
 
+use super::block::Block;
 use super::sigmf::SigmfMeta;
 use super::timestamps::Timestamps;
 use super::wav::WavChunk;
-use super::{IoError, StreamHeader};
+use super::{InputFault, IoError, StreamHeader};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// An opened input, which reads as the bytes of its frames. Each kind of input implements it once.
-pub(super) trait Capture: Read {
+/// An opened input: a header, and blocks of frames. Each kind of input implements it once; those whose
+/// samples are bytes do so as a [`ByteSource`].
+pub(super) trait Capture {
     /// Format, channels and rate, as stored.
+    fn stream_header(&self) -> StreamHeader;
+
+    /// Appends the next frames, about `bytes` bytes of them at most, to `block`, which is one of this header;
+    /// there may be none yet. False at the end.
+    fn read_block(&mut self, bytes: usize, block: &mut Block) -> Result<bool, io::Error>;
+
+    /// What it says besides its samples.
+    fn notes(&self) -> InputNotes {
+        InputNotes::default()
+    }
+
+    /// What was tolerated; to be asked once, when all samples have been read.
+    fn faults(&mut self) -> Vec<InputFault> {
+        Vec::new()
+    }
+
+    /// Chunks after the samples, once these have all been read.
+    fn chunks_after(&mut self) -> Vec<WavChunk> {
+        Vec::new()
+    }
+}
+
+/// An input that reads as the bytes of interleaved frames.
+pub(super) trait ByteSource: Read {
+    /// As [`Capture::stream_header`].
     fn stream_header(&self) -> StreamHeader;
 
     /// Bytes that the input promised and that have not come; known at the end.
@@ -23,7 +50,7 @@ pub(super) trait Capture: Read {
         InputNotes::default()
     }
 
-    /// Bytes of further samples, which are not read; known after [`Capture::chunks_after`].
+    /// Bytes of further samples, which are not read; known after [`ByteSource::chunks_after`].
     fn further_bytes(&self) -> u64 {
         0
     }
@@ -75,9 +102,9 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Begins with a block that is there.
-    pub(super) fn new(bytes: Vec<u8>) -> Self {
-        Self { bytes, given: 0 }
+    /// Puts a block that is there.
+    pub(super) fn put(&mut self, bytes: Vec<u8>) {
+        self.bytes = bytes;
     }
 
     /// Reads on; `refill` puts the next block into an empty vector, and leaves it empty at the end.

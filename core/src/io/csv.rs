@@ -3,7 +3,7 @@
 //! A first line with a cell that is no number is a heading; if its first cell names the time, that column is
 //! no channel and gives the rate. An empty cell is a missing sample.
 
-use super::capture::{Blocks, Capture};
+use super::capture::{Blocks, ByteSource};
 use super::table::{Table, number};
 use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
 use std::io::{self, Read};
@@ -73,7 +73,7 @@ impl<R: Read> CsvReader<R> {
             if let Some(unit) = unit {
                 reader.read_times(numbers[0], &first[0], unit, &mut ahead)?;
             }
-            reader.blocks = Blocks::new(ahead);
+            reader.blocks.put(ahead);
         }
         Ok(reader)
     }
@@ -139,7 +139,7 @@ impl<R: Read> CsvReader<R> {
     }
 }
 
-impl<R: Read> Capture for CsvReader<R> {
+impl<R: Read> ByteSource for CsvReader<R> {
     fn stream_header(&self) -> StreamHeader {
         self.header
     }

@@ -134,6 +134,25 @@ pub enum InputFault {
         /// The codes that whole numbers are.
         likely: Option<FullScale>,
     },
+    /// Codes of an input that does not state its full scale leave bits of their words unused.
+    #[error(
+        "its codes use {likely} of words of {bits}; if these are the bits of the converter, its full scale is smaller than that \
+         of the words, so state it"
+    )]
+    UnusedBits {
+        /// Bits of the words.
+        bits: u32,
+        /// The codes that they look like.
+        likely: FullScale,
+    },
+    /// Samples at the ends of the range of the converter, where it clips.
+    #[error("{count} of {of} samples are at an end of the range of the converter, where it clips")]
+    AtRails {
+        /// How many.
+        count: u64,
+        /// All samples.
+        of: u64,
+    },
     /// The input is longer than the shortest one, which decided where to end.
     #[error(
         "longer than the shortest channel, {}{frames} samples per channel were not used",

@@ -3,14 +3,14 @@
 //! A recording is read to its end or refused: what cannot be decoded is an error and never an unreported
 //! gap. Integers have the full scale 1.0 and keep all their bits.
 
-use super::capture::{Blocks, Capture};
-use super::{IoError, PcmFormat, SampleLayout, StreamHeader};
-use crate::quantity::FullScale;
+use super::block::Block;
+use super::capture::Capture;
+use super::{IoError, PcmFormat, SampleLayout, StreamHeader, Word};
 use claxon::Error;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 
-/// An open recording, which reads as `f64le`.
+/// An open recording.
 pub(super) struct FlacReader {
     name: String,
     flac: claxon::FlacReader<File>,
@@ -19,7 +19,6 @@ pub(super) struct FlacReader {
     frames: u64,
     /// The numbers of a frame of FLAC, kept for the next one.
     numbers: Vec<i32>,
-    blocks: Blocks,
 }
 
 impl FlacReader {
@@ -30,16 +29,17 @@ impl FlacReader {
     pub(super) fn open(file: File, name: &str) -> Result<Self, IoError> {
         let flac = claxon::FlacReader::new(file).map_err(|error| refused(name, 0, error))?;
         let info = flac.streaminfo();
-        let real = StreamHeader::real(SampleLayout::packed(PcmFormat::F64Le), info.channels as usize);
-        let rails = FullScale::Signed(info.bits_per_sample).rails();
-        let real = StreamHeader { is_scaled: true, rails, ..real };
+        let bits = info.bits_per_sample;
+        let format = if bits <= 24 { PcmFormat::S24Le } else { PcmFormat::S32Le };
+        let real = StreamHeader::real(SampleLayout::packed(format), info.channels as usize);
+        let word = Word { bits, is_unsigned: false };
+        let real = StreamHeader { is_scaled: true, word: Some(word), rails: Some(word.rails()), ..real };
         let header = StreamHeader { promised: info.samples, ..real.at_whole_hertz(info.sample_rate) };
-        let (name, blocks) = (name.to_owned(), Blocks::default());
-        Ok(Self { name, flac, header, frames: 0, numbers: Vec::new(), blocks })
+        Ok(Self { name: name.to_owned(), flac, header, frames: 0, numbers: Vec::new() })
     }
 
-    /// Puts the samples of the next block of FLAC into `bytes`; none at the end.
-    fn next_block(&mut self, bytes: &mut Vec<u8>) -> Result<(), IoError> {
+    /// Appends the samples of the next block of FLAC; false at the end.
+    fn next_block(&mut self, into: &mut Block) -> Result<bool, IoError> {
         let scale = 2f64.powi(1 - self.flac.streaminfo().bits_per_sample as i32);
         let numbers = std::mem::take(&mut self.numbers);
         let block = self.flac.blocks().read_next_or_eof(numbers);
@@ -48,7 +48,7 @@ impl FlacReader {
                 Some(promised) => {
                     Err(damaged_after(&self.name, self.frames, format!("its header promises {promised}")))
                 }
-                None => Ok(()),
+                None => Ok(false),
             };
         };
         if block.channels() as usize != self.header.channels {
@@ -56,13 +56,11 @@ impl FlacReader {
             return Err(damaged_after(&self.name, self.frames, problem));
         }
         for frame in 0..block.duration() {
-            for channel in 0..block.channels() {
-                bytes.extend((scale * f64::from(block.sample(channel, frame))).to_le_bytes());
-            }
+            into.extend((0..block.channels()).map(|channel| scale * f64::from(block.sample(channel, frame))));
         }
         self.frames += u64::from(block.duration());
         self.numbers = block.into_buffer();
-        Ok(())
+        Ok(true)
     }
 }
 
@@ -86,20 +84,16 @@ impl Capture for FlacReader {
     fn stream_header(&self) -> StreamHeader {
         self.header
     }
-}
 
-impl Read for FlacReader {
-    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        let mut blocks = std::mem::take(&mut self.blocks);
-        let count = blocks.read(bytes, |block| self.next_block(block));
-        self.blocks = blocks;
-        count
+    fn read_block(&mut self, _: usize, block: &mut Block) -> io::Result<bool> {
+        Ok(self.next_block(block)?)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::{OfflineSamples, RecordedFrames};
     use crate::random::Random;
     use std::path::Path;
 
@@ -112,10 +106,14 @@ mod tests {
         std::fs::write(path, bytes).unwrap();
         let reader = FlacReader::open(File::open(path).unwrap(), "x.flac");
         let mut reader = reader.map_err(|error| error.to_string())?;
-        let mut bytes = Vec::new();
-        reader.read_to_end(&mut bytes).map_err(|error| error.to_string())?;
-        let number = |bytes: &[u8]| f64::from_le_bytes(bytes.try_into().unwrap());
-        Ok((reader.stream_header(), bytes.chunks_exact(8).map(number).collect()))
+        let mut block = Block::default();
+        block.begin(&reader.stream_header());
+        while reader.next_block(&mut block).map_err(|error| error.to_string())? {}
+        let frames = block.view(0..block.frames(), 1);
+        let one = [RecordedFrames { real: frames.real, imaginary: None }];
+        let channels = OfflineSamples::of_frames(&one, usize::MAX).unwrap().channels;
+        let samples = (0..block.frames()).flat_map(|k| channels.iter().map(move |channel| channel[k]));
+        Ok((reader.stream_header(), samples.collect()))
     }
 
     #[test]

@@ -1,114 +1,452 @@
-//! The full scale of inputs whose format does not say it: tables, and floating-point numbers of arrays, raw
-//! streams and SigMF recordings.
+//! From the numbers of an input to samples of full scale 1.
+//!
+//! Full scale belongs to the converter, not to the word that holds its codes: 12 bits in a word of 16 reach
+//! 2047. They stand in the low bits of the word, or in the high ones where all codes are multiples of 16;
+//! the first codes other than 0 tell which. Words that count from 0 hold codes that count from 0.
 
-use super::{InputFault, PcmFormat, StreamHeader};
+use super::block::{Block, Numbers, with_numbers};
+use super::{InputFault, StreamHeader};
 use crate::quantity::FullScale;
+use crate::runtime::{PcmFormat, Sample};
 
-/// Brings the samples of an input to full scale 1, or looks whether they may have another one.
-#[derive(Debug)]
-pub(super) struct Scaling {
-    format: PcmFormat,
-    given: Option<FullScale>,
-    seen: Seen,
+/// A quiet signal leaves one or two bits of its converter unused; more are unusual enough to be said.
+const UNUSED_BITS: u32 = 3;
+/// Fewer codes do not tell which bits a converter has.
+const ENOUGH_CODES: u64 = 256;
+
+/// What is stated of the full scale of inputs.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct StatedScale {
+    /// By the user, for every input.
+    pub given: Option<FullScale>,
+    /// By the spec, for inputs [that state none](StreamHeader::is_scaled).
+    pub of_spec: Option<FullScale>,
+    /// Bits of the converters by the spec, for integers that state none.
+    pub bits: Option<u32>,
 }
 
-/// The samples so far.
-#[derive(Debug)]
+impl StatedScale {
+    /// The full scale of an input, and whether codes beyond it are an error. A WAV header that states fewer
+    /// bits than its words have is often wrong.
+    fn of(self, header: &StreamHeader) -> Option<(FullScale, bool)> {
+        let narrower = |bits: &u32| header.word.is_some_and(|word| *bits < word.bits);
+        let of_header = header.valid_bits.filter(narrower).map(|bits| (FullScale::Signed(bits), false));
+        let of_spec = || self.of_spec.or(self.bits.filter(narrower).map(FullScale::Signed));
+        let of_spec = if header.is_scaled { None } else { of_spec() };
+        self.given.or(of_spec).map(|scale| (scale, true)).or(of_header)
+    }
+
+    /// Lowest and highest sample of an input, if its samples are codes.
+    pub(super) fn rails(self, header: &StreamHeader) -> Option<(f64, f64)> {
+        match self.of(header) {
+            Some((FullScale::Number(_), _)) => None,
+            Some((codes, _)) => codes.rails(),
+            None => header.rails,
+        }
+    }
+}
+
+/// An integer word of an input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Word {
+    /// Its bits.
+    pub bits: u32,
+    /// It counts from 0, and the middle of its range is zero (offset binary).
+    pub is_unsigned: bool,
+}
+
+impl Word {
+    /// Of integers; `None` for floats.
+    pub fn of(format: PcmFormat) -> Option<Self> {
+        let word = Self { bits: 8 * format.bytes() as u32, is_unsigned: format.is_unsigned() };
+        (!format.is_float()).then_some(word)
+    }
+
+    /// Lowest and highest number that it holds, of its full scale.
+    pub(super) fn rails(self) -> (f64, f64) {
+        (-1.0, 1.0 - 1.0 / self.amplitude())
+    }
+
+    fn amplitude(self) -> f64 {
+        2f64.powi(self.bits as i32 - 1)
+    }
+
+    /// The code of the middle of the range.
+    fn middle(self) -> f64 {
+        if self.is_unsigned { self.amplitude() } else { 0.0 }
+    }
+
+    /// The codes of a converter in such words.
+    fn codes(self, scale: FullScale) -> FullScale {
+        match scale {
+            FullScale::Signed(bits) if self.is_unsigned => FullScale::Unsigned(bits),
+            other => other,
+        }
+    }
+}
+
+/// Where the codes of a converter stand in words that have more bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    /// No code but 0 so far.
+    Open,
+    Low,
+    /// The words have the full scale of the converter.
+    High,
+}
+
+/// Brings the samples of an input to full scale 1, and notes what is odd about them.
+#[derive(Debug, Clone)]
+pub(super) struct Scaling {
+    word: Option<Word>,
+    scale: Option<FullScale>,
+    /// Codes beyond the full scale are an error.
+    is_binding: bool,
+    /// Nobody states the full scale of integers.
+    is_open: bool,
+    place: Place,
+    codes: Codes,
+    seen: Seen,
+    frames: u64,
+}
+
+impl Scaling {
+    /// Of an input with this header.
+    ///
+    /// # Errors
+    /// Codes that its words cannot hold.
+    pub(super) fn new(header: &StreamHeader, stated: StatedScale) -> Result<Self, String> {
+        let found = stated.of(header);
+        let scale = found.map(|(scale, _)| header.word.map_or(scale, |word| word.codes(scale)));
+        if let (Some(word), Some(FullScale::Signed(bits) | FullScale::Unsigned(bits))) = (header.word, scale)
+            && bits > word.bits
+        {
+            return Err(format!(
+                "codes of {bits} bits do not fit its words of {} bits; state fewer",
+                word.bits
+            ));
+        }
+        Ok(Self {
+            word: header.word,
+            scale,
+            is_binding: found.is_some_and(|(_, is_binding)| is_binding),
+            is_open: found.is_none() && !header.is_scaled,
+            place: Place::Open,
+            codes: Codes::default(),
+            seen: Seen::new(stated.rails(header)),
+            frames: 0,
+        })
+    }
+
+    /// Takes the frames of a block from frame `first` on.
+    ///
+    /// # Errors
+    /// The first code beyond the full scale.
+    pub(super) fn take(&mut self, block: &mut Block, first: usize) -> Result<(), String> {
+        let begin = first * block.channels();
+        match (self.word, self.scale) {
+            (Some(word), None) if self.is_open => self.codes.take(block, begin, word),
+            (_, None) => {}
+            (Some(word), Some(scale @ (FullScale::Signed(bits) | FullScale::Unsigned(bits)))) => {
+                self.codes.take(block, begin, word);
+                self.choose(word, scale, word.bits - bits);
+                if self.place == Place::Low {
+                    apply(block, begin, word.amplitude(), scale.middle() - word.middle(), scale.amplitude());
+                } else if !self.codes.are_multiples(word.bits - bits) && self.is_binding {
+                    return Err(self.in_all_bits(word, scale));
+                }
+            }
+            (word, Some(scale)) => {
+                apply(block, begin, word.map_or(1.0, Word::amplitude), scale.middle(), scale.amplitude());
+            }
+        }
+        block.parts.iter().for_each(|part| self.seen.take(part, begin));
+        if self.is_binding
+            && self.limit().is_some_and(|limit| self.seen.least < -1.0 || self.seen.most > limit)
+        {
+            return Err(self.beyond(block, first));
+        }
+        self.frames += (block.frames() - first) as u64;
+        Ok(())
+    }
+
+    /// Decides where codes stand, `spare` bits fewer than their words have. Codes beyond those that are
+    /// stated, where that binds nobody, are codes of the whole word.
+    fn choose(&mut self, word: Word, scale: FullScale, spare: u32) {
+        let (middle, amplitude) = (scale.middle() - word.middle(), scale.amplitude());
+        let is_within =
+            self.codes.least as f64 >= middle - amplitude && (self.codes.most as f64) < middle + amplitude;
+        self.place = match self.place {
+            Place::Open if self.codes.used == 0 => Place::Open,
+            Place::Open if self.codes.are_multiples(spare) => Place::High,
+            Place::Open if !is_within && !self.is_binding => Place::High,
+            Place::Open => Place::Low,
+            chosen => chosen,
+        };
+    }
+
+    /// The highest sample of codes. Numbers that are no words may be means of codes.
+    fn limit(&self) -> Option<f64> {
+        let (_, highest) = self.scale?.rails()?;
+        Some(if self.word.is_some() { highest } else { 1.0 })
+    }
+
+    fn in_all_bits(&self, word: Word, scale: FullScale) -> String {
+        let (frames, bits) = (self.frames, word.bits);
+        format!(
+            "its first {frames} frames are multiples as codes of {scale} in the high bits of {bits} are, later ones are not; \
+             state the bits that it has"
+        )
+    }
+
+    /// Names the first sample beyond full scale.
+    fn beyond(&self, block: &Block, first: usize) -> String {
+        let channels = block.channels();
+        let limit = self.limit().unwrap_or(1.0);
+        let find = |part: &Numbers| -> Option<(usize, f64)> {
+            let beyond = |x: f64| x < -1.0 || x > limit;
+            with_numbers!(part, numbers => {
+                let at = numbers.iter().skip(first * channels).position(|x| beyond(x.to_f64()))?;
+                Some((at, numbers[first * channels + at].to_f64()))
+            })
+        };
+        let (at, sample) = block.parts.iter().find_map(find).unwrap_or((0, f64::NAN));
+        let scale = self.scale.unwrap_or(FullScale::Number(1.0));
+        let code = sample * scale.amplitude() + scale.middle();
+        let (frame, channel) = (self.frames + (at / channels) as u64, at % channels + 1);
+        format!(
+            "frame {frame} (from 0) of channel {channel} has the code {code}, beyond a full scale of {scale}; state the full \
+             scale of the converter"
+        )
+    }
+
+    /// What is odd about the samples; complete at the end.
+    pub(super) fn faults(&self) -> impl Iterator<Item = InputFault> {
+        let tells = self.is_open && self.seen.count >= ENOUGH_CODES;
+        let unused = self.word.filter(|_| tells).and_then(|word| self.codes.unused(word));
+        let (peak, is_float) = (self.seen.peak(), self.word.is_none());
+        let likely =
+            if self.seen.are_whole { FullScale::of_codes(self.seen.least, self.seen.most) } else { None };
+        let beyond = (is_float && peak > 1.0).then_some(InputFault::BeyondFullScale { peak, likely });
+        let Seen { count, at_rails, .. } = self.seen;
+        let clipped =
+            (peak <= 1.0 && at_rails > 0).then_some(InputFault::AtRails { count: at_rails, of: count });
+        unused.into_iter().chain(beyond).chain(clipped)
+    }
+}
+
+/// Brings the numbers of a block from `begin` on to full scale: number times `unit` is a code.
+fn apply(block: &mut Block, begin: usize, unit: f64, middle: f64, amplitude: f64) {
+    if (unit, middle) == (amplitude, 0.0) {
+        return;
+    }
+    for part in &mut block.parts {
+        with_numbers!(part, numbers => {
+            numbers[begin..].iter_mut().for_each(|x| *x = Sample::from_f64((x.to_f64() * unit - middle) / amplitude));
+        });
+    }
+}
+
+/// The codes of words so far, from the middle of their range.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+struct Codes {
+    least: i64,
+    most: i64,
+    /// The bits that any of them has.
+    used: u64,
+}
+
+impl Codes {
+    fn take(&mut self, block: &Block, begin: usize, word: Word) {
+        let unit = word.amplitude();
+        for part in &block.parts {
+            with_numbers!(part, numbers => for x in &numbers[begin..] {
+                let code = (x.to_f64() * unit) as i64;
+                *self = Self { least: self.least.min(code), most: self.most.max(code), used: self.used | code as u64 };
+            });
+        }
+    }
+
+    /// All are multiples of 2^`bits`.
+    fn are_multiples(self, bits: u32) -> bool {
+        self.used.trailing_zeros() >= bits
+    }
+
+    /// That steps of one use far fewer bits than the word has.
+    fn unused(self, word: Word) -> Option<InputFault> {
+        let middle = word.middle();
+        let likely = FullScale::of_codes(self.least as f64 + middle, self.most as f64 + middle)?;
+        let (FullScale::Signed(bits) | FullScale::Unsigned(bits)) = likely else { return None };
+        let is_odd = !self.are_multiples(1) && word.bits.saturating_sub(bits) >= UNUSED_BITS;
+        is_odd.then_some(InputFault::UnusedBits { bits: word.bits, likely })
+    }
+}
+
+/// The samples so far, of full scale.
+#[derive(Debug, Clone, Copy)]
 struct Seen {
     least: f64,
     most: f64,
     are_whole: bool,
-}
-
-impl Scaling {
-    /// Of an input with this header. `None` if its format has a full scale.
-    pub(super) fn new(header: &StreamHeader, given: Option<FullScale>) -> Option<Self> {
-        let seen = Seen { least: f64::INFINITY, most: f64::NEG_INFINITY, are_whole: true };
-        (!header.is_scaled).then_some(Self { format: header.layout.format, given, seen })
-    }
-
-    /// Takes whole frames.
-    pub(super) fn take(&mut self, frames: &mut [u8]) {
-        let Self { format, given, seen } = self;
-        let numbers = frames.chunks_exact_mut(format.bytes());
-        match given {
-            None => numbers.for_each(|bytes| seen.take(format.decode(bytes))),
-            Some(given) => {
-                let (middle, amplitude) = (given.middle(), given.amplitude());
-                numbers.for_each(|bytes| {
-                    format.encode((format.decode(bytes) - middle) / amplitude, bytes);
-                });
-            }
-        }
-    }
-
-    /// That full scale is likely not 1; complete at the end.
-    pub(super) fn fault(&self) -> Option<InputFault> {
-        let Seen { least, most, are_whole } = self.seen;
-        let peak = most.max(-least);
-        let likely = if are_whole { FullScale::of_codes(least, most) } else { None };
-        (peak > 1.0).then_some(InputFault::BeyondFullScale { peak, likely })
-    }
+    count: u64,
+    rails: (f64, f64),
+    at_rails: u64,
 }
 
 impl Seen {
-    fn take(&mut self, x: f64) {
-        if x.is_finite() {
-            self.least = self.least.min(x);
-            self.most = self.most.max(x);
-            self.are_whole &= x.fract() == 0.0;
+    /// None, of a converter with these rails; floats clip at full scale.
+    fn new(rails: Option<(f64, f64)>) -> Self {
+        let rails = rails.unwrap_or((-1.0, 1.0));
+        Self { least: 0.0, most: 0.0, are_whole: true, count: 0, rails, at_rails: 0 }
+    }
+
+    fn peak(&self) -> f64 {
+        self.most.max(-self.least)
+    }
+
+    fn take(&mut self, part: &Numbers, begin: usize) {
+        with_numbers!(part, numbers => self.take_numbers(&numbers[begin..]));
+    }
+
+    fn take_numbers<T: Sample>(&mut self, numbers: &[T]) {
+        let (low, high) = (T::from_f64(self.rails.0), T::from_f64(self.rails.1));
+        let zero = T::from_f64(0.0);
+        // Comparisons leave NaN out.
+        let least = numbers.iter().fold(zero, |least, &x| if x < least { x } else { least });
+        let most = numbers.iter().fold(zero, |most, &x| if x > most { x } else { most });
+        if least <= low || most >= high {
+            self.at_rails += numbers.iter().filter(|x| **x <= low || **x >= high).count() as u64;
         }
+        self.least = self.least.min(least.to_f64());
+        self.most = self.most.max(most.to_f64());
+        self.count += numbers.len() as u64;
+        let is_whole = |x: &T| x.to_f64().fract() == 0.0 || x.to_f64().is_nan();
+        self.are_whole = self.are_whole && numbers.iter().all(is_whole);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::SampleLayout;
+    use crate::io::{PcmFormat, SampleLayout};
+    use crate::runtime::PcmFrames;
 
+    const U12: FullScale = FullScale::Unsigned(12);
+    const S12: FullScale = FullScale::Signed(12);
+
+    /// What becomes of bytes of one channel, in blocks of three frames.
     fn scaled(
-        format: PcmFormat,
-        given: Option<FullScale>,
-        samples: &[f64],
-    ) -> (Vec<f64>, Option<InputFault>) {
-        let header = StreamHeader::real(SampleLayout::packed(format), 1);
-        let mut scaling = Scaling::new(&header, given).unwrap();
-        let mut bytes = vec![0; samples.len() * format.bytes()];
-        for (x, slot) in samples.iter().zip(bytes.chunks_exact_mut(format.bytes())) {
-            format.encode(*x, slot);
+        header: StreamHeader,
+        stated: StatedScale,
+        bytes: &[u8],
+    ) -> Result<(Vec<f64>, Vec<InputFault>), String> {
+        let mut scaling = Scaling::new(&header, stated)?;
+        let mut samples = Vec::new();
+        for bytes in bytes.chunks(3 * header.layout.container) {
+            let mut block = Block::default();
+            block.begin(&header);
+            block.decode(&PcmFrames { layout: header.layout, channels: 1, bytes }).unwrap();
+            scaling.take(&mut block, 0)?;
+            samples.extend(block.view(0..block.frames(), 1).real.channel(0));
         }
-        scaling.take(&mut bytes);
-        (bytes.chunks_exact(format.bytes()).map(|x| format.decode(x)).collect(), scaling.fault())
+        Ok((samples, scaling.faults().collect()))
+    }
+
+    fn header(format: PcmFormat) -> StreamHeader {
+        StreamHeader::real(SampleLayout::packed(format), 1)
+    }
+
+    fn given(scale: FullScale) -> StatedScale {
+        StatedScale { given: Some(scale), ..StatedScale::default() }
+    }
+
+    fn words(codes: &[i16]) -> Vec<u8> {
+        codes.iter().flat_map(|code| code.to_le_bytes()).collect()
+    }
+
+    fn floats(samples: &[f64]) -> Vec<u8> {
+        samples.iter().flat_map(|x| x.to_le_bytes()).collect()
     }
 
     #[test]
-    fn samples_come_to_full_scale() {
-        for format in [PcmFormat::F32Le, PcmFormat::F32Be, PcmFormat::F64Le, PcmFormat::F64Be] {
-            let (samples, fault) = scaled(format, Some(FullScale::Unsigned(8)), &[0.0, 64.0, 255.0]);
-            assert_eq!((samples, fault), (vec![-1.0, -0.5, 127.0 / 128.0], None));
-            let (samples, _) = scaled(format, Some(FullScale::Number(0.5)), &[f64::NAN, 1.0]);
-            assert!(samples[0].is_nan() && samples[1] == 2.0);
-        }
+    fn floats_come_to_full_scale() {
+        let read = |scale, samples: &[f64]| {
+            scaled(header(PcmFormat::F64Le), given(scale), &floats(samples)).unwrap().0
+        };
+        assert_eq!(read(FullScale::Unsigned(8), &[0.0, 64.0, 255.0]), [-1.0, -0.5, 127.0 / 128.0]);
+        let samples = read(FullScale::Number(0.5), &[f64::NAN, 1.0]);
+        assert!(samples[0].is_nan() && samples[1] == 2.0);
     }
 
     #[test]
     fn samples_beyond_one_have_a_likely_full_scale() {
-        let fault = |samples: &[f64]| {
-            let (same, fault) = scaled(PcmFormat::F64Le, None, samples);
-            assert_eq!(same.len(), samples.len());
-            fault
+        let faults = |samples: &[f64]| {
+            scaled(header(PcmFormat::F64Le), StatedScale::default(), &floats(samples)).unwrap().1
         };
-        assert_eq!(fault(&[1.0, -1.0, 0.25]), None);
-        assert_eq!(fault(&[]), None);
-        let beyond = |peak, likely| Some(InputFault::BeyondFullScale { peak, likely });
-        assert_eq!(fault(&[f64::NAN, -100.0, 127.0]), beyond(127.0, Some(FullScale::Signed(8))));
-        assert_eq!(fault(&[0.0, 4000.0]), beyond(4000.0, Some(FullScale::Unsigned(12))));
-        assert_eq!(fault(&[0.5, -1.5]), beyond(1.5, None));
+        assert_eq!(faults(&[0.5, -0.5, 0.25]), []);
+        assert_eq!(faults(&[]), []);
+        assert_eq!(faults(&[1.0, 1.0, 0.25, -1.0]), [InputFault::AtRails { count: 3, of: 4 }]);
+        let beyond = |peak, likely| [InputFault::BeyondFullScale { peak, likely }];
+        assert_eq!(faults(&[f64::NAN, -100.0, 127.0]), beyond(127.0, Some(FullScale::Signed(8))));
+        assert_eq!(faults(&[0.0, 4000.0]), beyond(4000.0, Some(U12)));
+        assert_eq!(faults(&[0.5, -1.5]), beyond(1.5, None));
     }
 
     #[test]
-    fn integers_have_their_own_full_scale() {
-        let header = StreamHeader::real(SampleLayout::packed(PcmFormat::S16Le), 1);
-        assert!(Scaling::new(&header, None).is_none());
+    fn codes_stand_in_the_low_or_in_the_high_bits() {
+        let want = [0.0, 0.0, 0.0, 0.5, -1.0, 1.0 / 2048.0];
+        let low = words(&[0, 0, 0, 1024, -2048, 1]);
+        let high = words(&[0, 0, 0, 16384, -32768, 16]);
+        for bytes in [&low, &high] {
+            let (samples, faults) = scaled(header(PcmFormat::S16Le), given(S12), bytes).unwrap();
+            assert_eq!((samples, faults), (want.to_vec(), vec![InputFault::AtRails { count: 1, of: 6 }]));
+        }
+        // Bits of the spec hold for integers that state none, and for no others.
+        let of_spec = StatedScale { bits: Some(12), ..StatedScale::default() };
+        assert_eq!(scaled(header(PcmFormat::S16Le), of_spec, &low).unwrap().0, want);
+        let wav = StreamHeader { is_scaled: true, ..header(PcmFormat::S16Le) };
+        assert_eq!(scaled(wav, of_spec, &low).unwrap().0[3], 1024.0 / 32768.0);
+    }
+
+    #[test]
+    fn codes_that_count_from_0_are_read_in_all_words() {
+        let bytes = words(&[2048, 0, 4095]);
+        let want = [0.0, -1.0, 2047.0 / 2048.0];
+        assert_eq!(scaled(header(PcmFormat::S16Le), given(U12), &bytes).unwrap().0, want);
+        for scale in [S12, U12] {
+            assert_eq!(scaled(header(PcmFormat::U16Le), given(scale), &bytes).unwrap().0, want);
+        }
+    }
+
+    #[test]
+    fn codes_beyond_those_that_are_stated_are_an_error_with_their_place() {
+        let beyond = scaled(header(PcmFormat::S16Le), given(S12), &words(&[1, 2, 3, 4, 2048])).unwrap_err();
+        assert!(beyond.contains("frame 4 (from 0) of channel 1 has the code 2048"), "{beyond}");
+        let mixed = scaled(header(PcmFormat::S16Le), given(S12), &words(&[16, 32, 48, 5])).unwrap_err();
+        assert!(mixed.contains("first 3 frames are multiples"), "{mixed}");
+        let narrow = scaled(header(PcmFormat::S8), given(S12), &[0]).unwrap_err();
+        assert!(narrow.contains("codes of 12 bits do not fit its words of 8"), "{narrow}");
+        let floats = scaled(header(PcmFormat::F64Le), given(S12), &floats(&[0.0, 3000.0])).unwrap_err();
+        assert!(floats.contains("frame 1 (from 0)"), "{floats}");
+    }
+
+    #[test]
+    fn a_header_that_states_too_few_bits_binds_nobody() {
+        let wav = StreamHeader { is_scaled: true, valid_bits: Some(12), ..header(PcmFormat::S16Le) };
+        let read = |codes: &[i16]| scaled(wav, StatedScale::default(), &words(codes)).unwrap().0;
+        assert_eq!(read(&[1, 1024]), [1.0 / 2048.0, 0.5]);
+        assert_eq!(read(&[16, 16384]), [1.0 / 2048.0, 0.5]);
+        assert_eq!(read(&[1, 16384]), [1.0 / 32768.0, 0.5]);
+    }
+
+    #[test]
+    fn bits_that_no_code_uses_are_said() {
+        let faults = |codes: &[i16]| {
+            scaled(header(PcmFormat::S16Le), StatedScale::default(), &words(codes)).unwrap().1
+        };
+        assert_eq!(faults(&[1, 2047, -2048].repeat(100)), [InputFault::UnusedBits { bits: 16, likely: S12 }]);
+        for codes in [[1, 8191, -8192].repeat(200), [16, 2032].repeat(200), vec![1, 2047]] {
+            assert_eq!(faults(&codes), []);
+        }
     }
 }

@@ -5,7 +5,7 @@
 //! next, or some that are lost. Such a frame is put together; all others stay where they were read.
 
 use super::aligned_input::AlignedInput;
-use super::{PcmFormat, PcmFrames, SampleLayout};
+use super::block::{Block, RecordedFrames};
 
 /// An input whose samples make frames.
 #[derive(Debug)]
@@ -13,13 +13,13 @@ pub(super) struct GroupedInput {
     pub(super) aligned: AlignedInput,
     /// Samples of each channel in a frame.
     per_frame: usize,
-    /// Numbers of the beginning of a frame that is put together, with NaN for lost ones.
-    begun: Vec<u8>,
+    /// The beginning of a frame that is put together.
+    begun: Block,
 }
 
 impl GroupedInput {
     pub(super) fn new(aligned: AlignedInput, per_frame: usize) -> Self {
-        Self { aligned, per_frame, begun: Vec::new() }
+        Self { aligned, per_frame, begun: Block::default() }
     }
 
     /// Samples of each channel in a frame.
@@ -29,7 +29,7 @@ impl GroupedInput {
 
     /// Samples of the frame that is put together.
     pub(super) fn begun(&self) -> usize {
-        self.begun.len() / (8 * self.aligned.header.columns())
+        self.begun.frames()
     }
 
     /// True if a block must come before this input can go on.
@@ -54,43 +54,40 @@ impl GroupedInput {
     /// all.
     pub(super) fn gather(&mut self, end: bool) {
         while self.ready() == 0 && self.aligned.ready() > 0 {
+            if self.begun() == 0 {
+                self.begun.begin(&self.aligned.header);
+            }
             let count = self.aligned.ready().min(self.per_frame - self.begun());
             self.aligned.prepare(count);
-            let frames = self.aligned.view(count);
-            for sample in frames.bytes.chunks(frames.layout.container) {
-                self.begun.extend(frames.layout.format.decode(sample).to_le_bytes());
-            }
+            self.aligned.copy_to(&mut self.begun, count);
             self.aligned.advance(count);
         }
         if end && self.begun() > 0 {
-            let missing = (self.per_frame - self.begun()) * self.aligned.header.columns();
-            self.begun.extend(std::iter::repeat_n(f64::NAN.to_le_bytes(), missing).flatten());
+            self.begun.extend_missing(self.per_frame - self.begun());
         }
     }
 
     /// Makes `frames` frames visible: at most those that are ready, or any number once the input is over.
     pub(super) fn prepare(&mut self, frames: usize) {
-        if self.begun.is_empty() {
+        if self.begun() == 0 {
             self.aligned.prepare(frames * self.per_frame);
         }
     }
 
-    /// The prepared frames. Of complex samples each part is a channel.
-    pub(super) fn view(&self, frames: usize) -> PcmFrames<'_> {
-        let channels = self.aligned.header.columns() * self.per_frame;
-        if self.begun.is_empty() {
-            return PcmFrames { channels, ..self.aligned.view(frames * self.per_frame) };
+    /// The prepared frames.
+    pub(super) fn view(&self, frames: usize) -> RecordedFrames<'_> {
+        match self.begun() {
+            0 => self.aligned.view(frames * self.per_frame, self.per_frame),
+            _ => self.begun.view(0..frames * self.per_frame, self.per_frame),
         }
-        let layout = SampleLayout::packed(PcmFormat::F64Le);
-        PcmFrames { layout, channels, bytes: &self.begun[..frames * channels * 8] }
     }
 
     /// Advances by `frames` frames.
     pub(super) fn advance(&mut self, frames: usize) {
-        if self.begun.is_empty() {
+        if self.begun() == 0 {
             self.aligned.advance(frames * self.per_frame);
         } else if frames > 0 {
-            self.begun.clear();
+            self.begun.begin(&self.aligned.header);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! One input of several: its thread, its frames in the order of time, and what was tolerated.
 
-use super::aligned_input::{AlignedInput, Block};
+use super::aligned_input::AlignedInput;
+use super::block::Block;
 use super::capture::InputNotes;
 use super::frames::{InputFrames, Message};
 use super::grouped::GroupedInput;
@@ -17,18 +18,18 @@ pub(super) const BLOCKS: usize = 4;
 
 /// Sends all messages of an input until its end, or until the receiver is gone. Blocks to fill come from
 /// `pool`.
-fn send_all(source: &InputSource, messages: &Sender<Result<Message, IoError>>, pool: &Receiver<Vec<u8>>) {
+fn send_all(source: &InputSource, messages: &Sender<Result<Message, IoError>>, pool: &Receiver<Block>) {
     let end = || -> Result<Message, IoError> {
         let mut frames = InputFrames::open(source)?;
         let notes = frames.capture().notes().grouped(source.samples_per_frame());
         let notes = Box::new(notes.map_err(IoError::unfit(&source.name()))?);
         let _ = messages.send(Ok(Message::Header { header: frames.header, notes }));
-        while let Ok(mut bytes) = pool.recv() {
-            let mut filled = 0;
-            while filled == 0 && !frames.ended() {
-                filled = frames.read_some(&mut bytes)?;
+        while let Ok(mut block) = pool.recv() {
+            block.begin(&frames.header);
+            while block.frames() == 0 && !frames.ended() {
+                frames.read_some(&mut block)?;
             }
-            if filled == 0 || messages.send(Ok(Message::Frames { bytes, filled })).is_err() {
+            if block.frames() == 0 || messages.send(Ok(Message::Frames(block))).is_err() {
                 break;
             }
         }
@@ -46,7 +47,7 @@ pub(super) struct Input {
     pub(super) grouped: GroupedInput,
     /// From its thread, to which blocks go back by the pool.
     messages: Receiver<Result<Message, IoError>>,
-    pool: Sender<Vec<u8>>,
+    pool: Sender<Block>,
     /// What it says besides its samples.
     pub(super) notes: InputNotes,
     faults: Vec<InputFault>,
@@ -68,13 +69,13 @@ impl Input {
         name: String,
         header: StreamHeader,
         per_frame: usize,
-        send_all: impl FnOnce(Sender<Result<Message, IoError>>, Receiver<Vec<u8>>) + Send + 'static,
+        send_all: impl FnOnce(Sender<Result<Message, IoError>>, Receiver<Block>) + Send + 'static,
     ) -> Result<Self, IoError> {
         let (message_sender, messages) = bounded(BLOCKS + 2);
         let (pool, pool_out) = bounded(BLOCKS);
         (0..BLOCKS).for_each(|_| {
             // The channel has room for all blocks.
-            let _ = pool.send(Vec::new());
+            let _ = pool.send(Block::default());
         });
         let thread = thread::Builder::new().name("input".into());
         thread
@@ -114,8 +115,8 @@ impl Input {
                 self.grouped = GroupedInput::new(AlignedInput::new(header), self.grouped.per_frame());
                 self.notes = InputNotes { per_frame: self.grouped.per_frame(), ..*notes };
             }
-            Message::Frames { bytes, filled } => {
-                let used = self.grouped.aligned.refill(Block { bytes, filled });
+            Message::Frames(block) => {
+                let used = self.grouped.aligned.refill(block);
                 self.give_back(used);
             }
             Message::End { faults, chunks } => {
@@ -134,9 +135,9 @@ impl Input {
     }
 
     fn give_back(&mut self, block: Block) {
-        if !block.bytes.is_empty() {
+        if !block.parts.is_empty() {
             // A thread that has ended needs no blocks.
-            let _ = self.pool.send(block.bytes);
+            let _ = self.pool.send(block);
         }
     }
 

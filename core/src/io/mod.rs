@@ -27,6 +27,8 @@
 
 mod aligned_input;
 mod array;
+mod block;
+mod byte_frames;
 mod capture;
 mod csv;
 mod error;
@@ -60,9 +62,11 @@ pub mod wav;
 
 pub use crate::runtime::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
 pub use array::{ArrayHeader, ArrayReader};
+pub use block::{NumberFrames, RecordedFrames};
 pub use csv::CsvReader;
 pub use error::{InputFault, InputWarning, IoError};
 pub use frame_file::FrameFile;
+pub use full_scale::{StatedScale, Word};
 pub use lost::LostSamples;
 pub use mat::{mat_variable, open_mat};
 pub use multi_reader::{Arrival, MultiReader};

@@ -11,7 +11,7 @@ use super::notes::{OutputNotes, Placement};
 use super::open::InputSource;
 use super::pipe::refuse_shared_pipes;
 use super::stall::{OnStall, Wait};
-use super::{InputWarning, IoError, PcmFrames, ReadOptions, StreamHeader, Until};
+use super::{InputWarning, IoError, ReadOptions, RecordedFrames, StreamHeader, Until};
 use crossbeam_channel::Receiver;
 use std::path::PathBuf;
 
@@ -77,7 +77,7 @@ impl MultiReader {
             coding: options.coding,
             channels: options.channels,
             only: options.only,
-            full_scale: options.full_scale,
+            scale: options.scale,
             interleaving: interleaving.cloned(),
             per_frame: options.samples_per_frame.get(i).copied().unwrap_or(1),
             block,
@@ -109,7 +109,7 @@ impl MultiReader {
             .sum()
     }
 
-    /// True if the samples are complex; then each part is a channel of [`MultiReader::frames`].
+    /// True if the samples are complex.
     pub fn is_complex(&self) -> bool {
         self.headers().any(|(_, header)| header.is_complex)
     }
@@ -163,7 +163,7 @@ impl MultiReader {
     }
 
     /// The ready frames, as many as [`MultiReader::wait`] returned. Lost samples are NaN.
-    pub fn frames(&self) -> Vec<PcmFrames<'_>> {
+    pub fn frames(&self) -> Vec<RecordedFrames<'_>> {
         self.inputs.iter().map(|input| input.grouped.view(self.ready)).collect()
     }
 

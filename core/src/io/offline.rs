@@ -1,7 +1,8 @@
 //! Recordings in memory.
 
-use super::{Arrival, IoError, MultiReader, PcmFrames};
+use super::{Arrival, IoError, MultiReader, RecordedFrames};
 use crate::messages::Quoted;
+use crate::runtime::Input;
 use std::collections::TryReserveError;
 
 /// Recordings that are not read.
@@ -72,9 +73,10 @@ impl OfflineSamples {
     ///
     /// # Errors
     /// [`OfflineError::Memory`].
-    pub fn of_frames(frames: &[PcmFrames<'_>], most: usize) -> Result<Self, OfflineError> {
-        let mut channels = vec![Vec::new(); frames.iter().map(|part| part.channels).sum()];
-        let longest = frames.iter().map(PcmFrames::frames).max().unwrap_or_default();
+    pub fn of_frames(frames: &[RecordedFrames<'_>], most: usize) -> Result<Self, OfflineError> {
+        let numbers = frames.iter().flat_map(RecordedFrames::parts).map(|part| part.channels());
+        let mut channels = vec![Vec::new(); numbers.sum()];
+        let longest = frames.iter().map(RecordedFrames::frames).max().unwrap_or_default();
         reserve(&mut channels, longest.min(most))?;
         append(frames, most, &mut channels);
         Ok(Self { channels, is_cut: false })
@@ -100,14 +102,14 @@ fn reserve(channels: &mut [Vec<f64>], more: usize) -> Result<(), OfflineError> {
     reserved.map_err(|_: TryReserveError| refused)
 }
 
-/// The first `count` frames of all parts.
-fn append(parts: &[PcmFrames<'_>], count: usize, channels: &mut [Vec<f64>]) {
+/// The first `count` frames of all recordings; the parts of a complex channel follow each other.
+fn append(recordings: &[RecordedFrames<'_>], count: usize, channels: &mut [Vec<f64>]) {
     let mut next = channels.iter_mut();
-    for part in parts {
-        let (format, container) = (part.layout.format, part.layout.container);
-        for (c, samples) in next.by_ref().take(part.channels).enumerate() {
-            let frames = part.bytes.chunks_exact(part.frame_bytes()).take(count);
-            samples.extend(frames.map(|frame| format.decode(&frame[c * container..])));
+    for recording in recordings {
+        for channel in 0..recording.real.channels() {
+            for (part, samples) in recording.parts().zip(&mut next) {
+                samples.extend(part.channel(channel).take(count));
+            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Opens inputs of every kind.
 
-use super::capture::{Capture, open_file};
+use super::byte_frames::ByteFrames;
+use super::capture::{ByteSource, Capture, open_file};
 use super::csv::CsvReader;
 use super::mat::{mat_variable, open_mat};
 use super::npy::open_npy;
@@ -9,9 +10,8 @@ use super::sigmf::is_sigmf;
 use super::sigmf_reader::SigmfReader;
 use super::table::is_table;
 use super::wav::WavReader;
-use super::{Coding, IoError, PcmFormat, SampleLayout, StreamHeader, TimeInterleaving};
+use super::{Coding, IoError, PcmFormat, SampleLayout, StatedScale, StreamHeader, TimeInterleaving};
 use crate::messages::Quoted;
-use crate::quantity::FullScale;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
@@ -75,8 +75,8 @@ pub(super) struct InputSource {
     pub(super) per_frame: usize,
     /// The only channel to read, from 0.
     pub(super) only: Option<usize>,
-    /// Full scale, if the format does not say it.
-    pub(super) full_scale: Option<FullScale>,
+    /// What is said of its full scale.
+    pub(super) scale: StatedScale,
     /// Bytes of a block.
     pub(super) block: usize,
 }
@@ -91,12 +91,6 @@ impl InputSource {
         self.path.as_os_str() == "-"
     }
 
-    /// True for tables and arrays, whose numbers may be codes of a converter. Floats of streams have full
-    /// scale 1 by convention.
-    pub(super) fn may_hold_codes(&self) -> bool {
-        matches!(Kind::of(&self.path, self.coding), Kind::Csv | Kind::Npy | Kind::Mat)
-    }
-
     /// Samples in a row that are a frame: one of each time-interleaved converter.
     pub(super) fn samples_per_frame(&self) -> usize {
         self.interleaving.as_ref().map_or(1, TimeInterleaving::converters)
@@ -109,21 +103,25 @@ impl InputSource {
     pub(super) fn open(&self) -> Result<Box<dyn Capture>, IoError> {
         let (path, name) = (self.path.as_path(), self.name());
         Ok(match Kind::of(path, self.coding) {
-            Kind::Sigmf => Box::new(SigmfReader::open(path)?),
+            Kind::Sigmf => Box::new(ByteFrames::new(SigmfReader::open(path)?)),
             Kind::Archive => return Err(unread(path, EXTRACT)),
-            Kind::Csv => Box::new(CsvReader::new(self.stream()?, &name)?),
-            Kind::Npy => Box::new(open_npy(open_file(path)?, &name)?),
+            Kind::Csv => Box::new(ByteFrames::new(CsvReader::new(self.stream()?, &name)?)),
+            Kind::Npy => Box::new(ByteFrames::new(open_npy(open_file(path)?, &name)?)),
             Kind::Mat => {
                 let (file, variable) = mat_variable(path).unwrap_or_else(|| (path.to_owned(), None));
-                Box::new(open_mat(&mut open_file(&file)?, variable, &file.display().to_string())?)
+                Box::new(ByteFrames::new(open_mat(
+                    &mut open_file(&file)?,
+                    variable,
+                    &file.display().to_string(),
+                )?))
             }
             #[cfg(feature = "flac")]
             Kind::Flac => Box::new(super::flac::FlacReader::open(open_file(path)?, &name)?),
             #[cfg(not(feature = "flac"))]
             Kind::Flac => return Err(unread(path, &decode(path))),
             Kind::Encoded => return Err(unread(path, &decode(path))),
-            Kind::Raw => Box::new(RawReader { source: self.clone(), bytes: None }),
-            Kind::Wav => Box::new(WavReader::new(self.stream()?, &name)?),
+            Kind::Raw => Box::new(ByteFrames::new(RawReader { source: self.clone(), bytes: None })),
+            Kind::Wav => Box::new(ByteFrames::new(WavReader::new(self.stream()?, &name)?)),
         })
     }
 
@@ -163,7 +161,7 @@ struct RawReader {
     bytes: Option<Box<dyn Read>>,
 }
 
-impl Capture for RawReader {
+impl ByteSource for RawReader {
     fn stream_header(&self) -> StreamHeader {
         self.source.raw_header()
     }
@@ -198,6 +196,7 @@ impl Read for RawReader {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::block::Block;
 
     #[test]
     fn only_a_wav_header_at_the_beginning_of_raw_samples_is_refused() {
@@ -213,10 +212,14 @@ mod tests {
                 interleaving: None,
                 per_frame: 1,
                 only: None,
-                full_scale: None,
+                scale: StatedScale::default(),
                 block: 4096,
             };
-            io::copy(&mut source.open().unwrap(), &mut io::sink())
+            let mut block = Block::default();
+            let mut capture = source.open().unwrap();
+            block.begin(&capture.stream_header());
+            while capture.read_block(4096, &mut block)? {}
+            io::Result::Ok(block.frames())
         };
         let header = b"RIFF\x24\0\0\0WAVEfmt ";
         let error = read(header).unwrap_err().to_string();

@@ -1,8 +1,8 @@
 //! Settings of the reading of several inputs.
 
 use super::timestamps::MAX_LOST;
-use super::{Coding, LostSamples};
-use crate::quantity::FullScale;
+use super::{Coding, LostSamples, StatedScale};
+use crate::runtime::Sample;
 
 /// Bytes of a block that suit one thread.
 pub const BLOCK_BYTES: usize = 128 << 10;
@@ -26,8 +26,8 @@ pub struct ReadOptions<'a> {
     pub channels: usize,
     /// The only channel to read of each input, from 0.
     pub only: Option<usize>,
-    /// Full scale of inputs whose [format does not say it](super::StreamHeader::is_scaled); 1 if `None`.
-    pub full_scale: Option<FullScale>,
+    /// What is said of their full scale.
+    pub scale: StatedScale,
     /// The time-interleaved converters of the only input, which has one channel then. Its frames are those
     /// of an input of M channels, at an M-th of its rate.
     pub interleaving: Option<&'a TimeInterleaving>,
@@ -52,7 +52,7 @@ impl ReadOptions<'_> {
             coding: Coding::Wav,
             channels: 1,
             only: None,
-            full_scale: None,
+            scale: StatedScale::default(),
             interleaving: None,
             samples_per_frame: &[],
             lost: None,
@@ -96,17 +96,15 @@ impl TimeInterleaving {
         &self.channels
     }
 
-    /// Puts the samples of whole frames, of `container` bytes each, into the order of the channels.
-    pub(super) fn reorder(&self, bytes: &mut [u8], container: usize) {
+    /// Puts the samples of whole frames into the order of the channels.
+    pub(super) fn reorder<T: Sample>(&self, samples: &mut [T]) {
         if self.channels.is_sorted() {
             return;
         }
-        let mut frame = vec![0; container * self.converters()];
-        for samples in bytes.chunks_exact_mut(frame.len()) {
-            frame.copy_from_slice(samples);
-            for (&channel, sample) in self.channels.iter().zip(frame.chunks_exact(container)) {
-                samples[channel * container..][..container].copy_from_slice(sample);
-            }
+        let mut turns = vec![T::default(); self.converters()];
+        for frame in samples.chunks_exact_mut(self.converters()) {
+            turns.copy_from_slice(frame);
+            self.channels.iter().zip(&turns).for_each(|(&channel, sample)| frame[channel] = *sample);
         }
     }
 }
@@ -125,11 +123,11 @@ mod tests {
     #[test]
     fn whole_frames_come_into_the_order_of_the_channels() {
         let turns = TimeInterleaving::by_delay(&[0.0, 2.0, 1.0]);
-        // Two bytes a sample, two frames; converters are the channels 1, 2 and 0.
-        let mut bytes = *b"1a2b0c1d2e0f";
-        turns.reorder(&mut bytes, 2);
-        assert_eq!(&bytes, b"0c1a2b0f1d2e");
-        TimeInterleaving::in_order(3).reorder(&mut bytes, 2);
-        assert_eq!(&bytes, b"0c1a2b0f1d2e");
+        // Two frames; converters are the channels 1, 2 and 0.
+        let mut samples = [1.0f32, 2.0, 0.0, 1.5, 2.5, 0.5];
+        turns.reorder(&mut samples);
+        assert_eq!(samples, [0.0, 1.0, 2.0, 0.5, 1.5, 2.5]);
+        TimeInterleaving::in_order(3).reorder(&mut samples);
+        assert_eq!(samples, [0.0, 1.0, 2.0, 0.5, 1.5, 2.5]);
     }
 }

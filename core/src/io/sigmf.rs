@@ -301,7 +301,8 @@ mod tests {
     fn every_format_has_a_name_and_back() {
         let names: Vec<String> = PcmFormat::ALL.into_iter().map(|f| format!("r{}", datatype(f))).collect();
         let want = [
-            "ri8", "ru8", "ri16_le", "ri16_be", "ri24_le", "ri24_be", "ri32_le", "ri32_be", "rf32_le",
+            "ri8", "ru8", "ri16_le", "ri16_be", "ri24_le", "ri24_be", "ri32_le", "ri32_be", "ru16_le",
+            "ru16_be", "ru32_le", "ru32_be", "ri64_le", "ri64_be", "rf16_le", "rf16_be", "rf32_le",
             "rf32_be", "rf64_le", "rf64_be",
         ];
         assert_eq!(names, want);

@@ -1,6 +1,6 @@
 //! The samples of SigMF recordings.
 
-use super::capture::{Capture, InputNotes, open_file};
+use super::capture::{ByteSource, InputNotes, open_file};
 use super::sigmf::{SigmfMeta, file_pair, malformed};
 use super::timestamps::Timestamps;
 use super::{IoError, StreamHeader};
@@ -79,7 +79,7 @@ impl Read for SigmfReader {
     }
 }
 
-impl Capture for SigmfReader {
+impl ByteSource for SigmfReader {
     fn stream_header(&self) -> StreamHeader {
         self.header
     }

@@ -1,6 +1,6 @@
 //! The format of an input.
 
-use super::{ParsePcmFormatError, PcmFormat, SampleLayout};
+use super::{ParsePcmFormatError, PcmFormat, SampleLayout, Word};
 use std::fmt;
 use std::str::FromStr;
 
@@ -90,8 +90,12 @@ pub struct StreamHeader {
     pub begin: Option<f64>,
     /// Number of frames according to the header.
     pub promised: Option<u64>,
-    /// Full scale is 1 by the format: of integers, of WAV and FLAC files.
+    /// The format states its full scale: WAV and FLAC.
     pub is_scaled: bool,
+    /// The words of integers; `None` for floats.
+    pub word: Option<Word>,
+    /// Bits of the words that count, if the header states them.
+    pub valid_bits: Option<u32>,
     /// Lowest and highest sample of integers and of codes; `None` for floats.
     pub rails: Option<(f64, f64)>,
 }
@@ -99,7 +103,7 @@ pub struct StreamHeader {
 impl StreamHeader {
     /// Real samples of which nothing else is known.
     pub fn real(layout: SampleLayout, channels: usize) -> Self {
-        let is_scaled = !layout.format.is_float();
+        let word = Word::of(layout.format);
         Self {
             layout,
             channels,
@@ -108,8 +112,10 @@ impl StreamHeader {
             rate_error: 0.0,
             begin: None,
             promised: None,
-            is_scaled,
-            rails: is_scaled.then(|| rails(layout.format)),
+            is_scaled: false,
+            word,
+            valid_bits: None,
+            rails: word.map(Word::rails),
         }
     }
 
@@ -137,17 +143,6 @@ impl StreamHeader {
     pub fn frame_bytes(&self) -> usize {
         self.layout.container * self.columns()
     }
-}
-
-/// The lowest and highest value of an integer format.
-fn rails(format: PcmFormat) -> (f64, f64) {
-    let mut bytes = vec![0; format.bytes()];
-    // Encoding saturates.
-    let mut nearest = |value: f64| {
-        format.encode(value, &mut bytes);
-        format.decode(&bytes)
-    };
-    (nearest(-2.0), nearest(2.0))
 }
 
 #[cfg(test)]

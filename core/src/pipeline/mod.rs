@@ -23,7 +23,7 @@
 //! for frame in [[1, 2], [3, 4]].map(|frame: [i16; 2]| frame.map(i16::to_le_bytes).concat()) {
 //!     let layout = SampleLayout::packed(PcmFormat::S16Le);
 //!     let recording = PcmFrames { layout, channels: 2, bytes: &frame };
-//!     pipeline.push(&[recording], &mut |block: Block<'_>| Ok(output.extend_from_slice(block.samples)))?;
+//!     pipeline.push_parts(&[&recording], &mut |block: Block<'_>| Ok(output.extend_from_slice(block.samples)))?;
 //! }
 //! assert_eq!(output, [1, 0, 2, 0, 3, 0, 4, 0]);
 //! assert_eq!(pipeline.finish().samples, 4);

@@ -2,7 +2,7 @@
 
 use super::{Block, PipelineError};
 use crate::files::{AtomicFile, commit_all};
-use crate::io::{IoError, OutputNotes, PcmFormat, SampleWriter};
+use crate::io::{IoError, OutputNotes, SampleWriter};
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -15,9 +15,9 @@ use std::path::PathBuf;
 /// let path = std::env::temp_dir().join(format!("hybank-outputs-{}.raw", std::process::id()));
 /// let (container, format) = (Container::Raw, PcmFormat::S8);
 /// let header = OutputHeader { container, format, is_complex: false, rate: 1.0 };
-/// let mut outputs = FileOutputs::new(SampleWriter::create(&path, header, false)?, None, format);
+/// let mut outputs = FileOutputs::new(SampleWriter::create(&path, header, false)?, None);
 /// outputs.write(Block { samples: &[32, 0xC0], mask: None })?;
-/// assert!(outputs.peak() == 0.5 && !path.exists());
+/// assert!(!path.exists());
 /// outputs.finish()?;
 /// assert_eq!(std::fs::read(&path)?, [32, 0xC0]);
 /// # std::fs::remove_file(path)?;
@@ -26,15 +26,12 @@ use std::path::PathBuf;
 pub struct FileOutputs {
     samples: SampleWriter,
     mask: Option<AtomicFile>,
-    format: PcmFormat,
-    /// The largest magnitude so far, of full scale.
-    peak: f64,
 }
 
 impl FileOutputs {
-    /// Writes samples, encoded as `format`, to `samples`, and the mask to `mask` if given.
-    pub fn new(samples: SampleWriter, mask: Option<AtomicFile>, format: PcmFormat) -> Self {
-        Self { samples, mask, format, peak: 0.0 }
+    /// Writes encoded samples to `samples`, and the mask to `mask` if given.
+    pub fn new(samples: SampleWriter, mask: Option<AtomicFile>) -> Self {
+        Self { samples, mask }
     }
 
     /// From now on what was written stays, under the hidden names that this gives, if the files get no
@@ -61,13 +58,7 @@ impl FileOutputs {
         if let (Some(file), Some(mask)) = (&mut self.mask, block.mask) {
             file.write_all(mask).map_err(IoError::system(file.name(), "write it"))?;
         }
-        self.peak = self.peak.max(self.format.peak(block.samples));
         self.samples.write(block.samples)
-    }
-
-    /// The largest magnitude so far, of full scale.
-    pub fn peak(&self) -> f64 {
-        self.peak
     }
 
     /// Completes the files and renames them to their final names.

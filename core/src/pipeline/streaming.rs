@@ -3,8 +3,8 @@
 use super::fusion::Fusion;
 use super::{Gap, Outcome, PipelineError, Settings};
 use crate::bank::Bank;
-use crate::io::{IoError, PcmFormat, PcmFrames};
-use crate::runtime::{Frames, Input, PcmOutput, Plan};
+use crate::io::{IoError, NumberFrames, PcmFormat, RecordedFrames};
+use crate::runtime::{Frames, Input, PcmOutput, Plan, SideBySide};
 
 /// Maximum size of the encoded output of one step for one thread: a share of the second-level cache.
 const STEP_BYTES: usize = 256 << 10;
@@ -34,6 +34,7 @@ pub struct Pipeline<'a> {
     step: usize,
     samples: u64,
     pub(super) clipped: u64,
+    peak: f64,
     buffer: Vec<u8>,
 }
 
@@ -51,7 +52,7 @@ impl<'a> Pipeline<'a> {
         let steps = if settings.workers.is_some() { PARALLEL_STEPS } else { 1 };
         let fusion = Fusion::new(bank, plan, 1 + usize::from(is_complex), settings);
         let step = (steps * STEP_BYTES / plan.ratio() / format.bytes()).max(1);
-        Self { fusion, format, step, samples: 0, clipped: 0, buffer: Vec::new() }
+        Self { fusion, format, step, samples: 0, clipped: 0, peak: 0.0, buffer: Vec::new() }
     }
 
     /// The plan.
@@ -80,6 +81,11 @@ impl<'a> Pipeline<'a> {
         self.clipped
     }
 
+    /// The largest magnitude of the output so far, of full scale, before it saturates.
+    pub fn peak(&self) -> f64 {
+        self.peak
+    }
+
     /// Numbers of the input so far that were NaN or infinite and became 0.
     pub fn replaced(&self) -> u64 {
         self.fusion.replaced()
@@ -104,13 +110,13 @@ impl<'a> Pipeline<'a> {
     ///
     /// # Errors
     /// [`PipelineError::Process`] if the channels do not match the bank, and the errors of `write`.
-    pub fn push(&mut self, recordings: &[PcmFrames<'_>], write: Write<'_>) -> Result<(), PipelineError> {
+    pub fn push(&mut self, recordings: &[RecordedFrames<'_>], write: Write<'_>) -> Result<(), PipelineError> {
+        let real: Vec<NumberFrames<'_>> = recordings.iter().map(|recording| recording.real).collect();
         if self.fusion.parts() == 1 {
-            return self.run(&[&recordings], write);
+            return self.push_parts(&[&SideBySide(&real)], write);
         }
-        let part = |part| recordings.iter().map(|frames| frames.part(part)).collect::<Vec<_>>();
-        let [real, imaginary] = [part(0), part(1)];
-        self.run(&[&real.as_slice(), &imaginary.as_slice()], write)
+        let imaginary: Vec<_> = recordings.iter().filter_map(|recording| recording.imaginary).collect();
+        self.push_parts(&[&SideBySide(&real), &SideBySide(&imaginary)], write)
     }
 
     /// Processes frames without a signal (zeros, once the offsets are subtracted) until `samples` samples
@@ -125,6 +131,7 @@ impl<'a> Pipeline<'a> {
             let mut output = room(&mut self.buffer, self.format, frames * self.fusion.outputs());
             let written = self.fusion.flush(frames, most, &mut output)?;
             self.clipped += output.clipped;
+            self.peak = self.peak.max(output.peak(written * self.fusion.parts()));
             self.written(written, write)?;
         }
         Ok(())
@@ -135,8 +142,11 @@ impl<'a> Pipeline<'a> {
         self.fusion.finish(self.samples, self.clipped)
     }
 
-    /// All frames of all parts, step by step.
-    fn run(&mut self, parts: &[&dyn Input], write: Write<'_>) -> Result<(), PipelineError> {
+    /// As [`Pipeline::push`], of the real samples, or of the real and the imaginary parts of complex ones.
+    ///
+    /// # Errors
+    /// As [`Pipeline::push`].
+    pub fn push_parts(&mut self, parts: &[&dyn Input], write: Write<'_>) -> Result<(), PipelineError> {
         let frames = parts.first().map_or(0, |part| part.frames());
         let mut first = 0;
         while first < frames {
@@ -153,6 +163,7 @@ impl<'a> Pipeline<'a> {
         let mut output = room(&mut self.buffer, self.format, frames * self.fusion.outputs());
         let written = self.fusion.step(parts, usize::MAX, &mut output)?;
         self.clipped += output.clipped;
+        self.peak = self.peak.max(output.peak(written * self.fusion.parts()));
         self.written(written, write)
     }
 

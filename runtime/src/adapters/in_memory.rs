@@ -24,6 +24,17 @@ impl<'a, S: Sample> Interleaved<'a, S> {
         }
         Ok(Self { samples, channels, frames })
     }
+
+    /// The whole frames at the beginning.
+    pub fn whole(samples: &'a [S], channels: usize) -> Self {
+        let frames = samples.len().checked_div(channels).unwrap_or(0);
+        Self { samples: &samples[..frames * channels], channels, frames }
+    }
+
+    /// All samples, frame after frame.
+    pub fn samples(&self) -> &'a [S] {
+        self.samples
+    }
 }
 
 impl<S: Sample> Input for Interleaved<'_, S> {

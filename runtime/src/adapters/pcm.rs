@@ -1,7 +1,7 @@
 //! Recordings as they lie in files and pipes.
 
 use super::{Halves, Input, Output, SCRATCH, SplitOutput, convert};
-use crate::pcm::for_pcm_format;
+use crate::pcm::{for_pcm_format, peak};
 use crate::simd::{decode, encode};
 use crate::{Isa, PcmFormat, PcmFrames, Sample, SampleLayout};
 use std::ops::Range;
@@ -16,6 +16,8 @@ pub struct PcmOutput<'a> {
     pub bytes: &'a mut [u8],
     /// Samples that were clipped, added to by every call.
     pub clipped: u64,
+    /// The largest magnitude of the samples that were encoded.
+    encoded_peak: f64,
     /// The part of complex samples that is stored, see [`Output::select`].
     part: Option<usize>,
 }
@@ -23,15 +25,20 @@ pub struct PcmOutput<'a> {
 impl<'a> PcmOutput<'a> {
     /// Room for samples that lie close together, none of them clipped so far.
     pub fn packed(format: PcmFormat, bytes: &'a mut [u8]) -> Self {
-        Self { layout: SampleLayout::packed(format), bytes, clipped: 0, part: None }
+        Self { layout: SampleLayout::packed(format), bytes, clipped: 0, encoded_peak: 0.0, part: None }
     }
 
-    /// Room for the first `samples` samples and for all others, and where what they clip is to be added.
-    pub fn split(&mut self, samples: usize) -> ([PcmOutput<'_>; 2], &mut u64) {
-        let (layout, part, size) = (self.layout, self.part, self.selected().0.container);
-        let (earlier, later) = self.bytes.split_at_mut(samples * size);
-        let half = |bytes| PcmOutput { layout, bytes, clipped: 0, part };
-        ([half(earlier), half(later)], &mut self.clipped)
+    /// The largest magnitude, of full scale, of the first `samples` numbers, as they were before they saturated.
+    pub fn peak(&self, samples: usize) -> f64 {
+        let size = self.layout.format.bytes();
+        let written = &self.bytes[..(samples * size).min(self.bytes.len())];
+        if is_native::<f32>(self.layout) {
+            return bytemuck::try_cast_slice(written).map_or(self.encoded_peak, peak::<f32>);
+        }
+        if is_native::<f64>(self.layout) {
+            return bytemuck::try_cast_slice(written).map_or(self.encoded_peak, peak::<f64>);
+        }
+        self.encoded_peak
     }
 
     /// Room for samples that lie in memory as numbers do. Parts of complex samples lie apart.
@@ -135,6 +142,7 @@ impl Output for PcmOutput<'_> {
     }
 
     fn store_f32(&mut self, isa: Isa, first: usize, samples: &[f32]) {
+        self.encoded_peak = self.encoded_peak.max(peak(samples));
         let (layout, out) = self.from(first);
         self.clipped += match layout.is_packed() {
             true => encode(isa, layout.format, samples, out),
@@ -143,6 +151,7 @@ impl Output for PcmOutput<'_> {
     }
 
     fn store_f64(&mut self, isa: Isa, first: usize, samples: &[f64]) {
+        self.encoded_peak = self.encoded_peak.max(peak(samples));
         let (layout, out) = self.from(first);
         self.clipped += match layout.is_packed() && layout.format.bytes() < 4 {
             true => encode_by_scratch(isa, layout.format, samples, out),
@@ -154,9 +163,13 @@ impl Output for PcmOutput<'_> {
 
 impl SplitOutput for PcmOutput<'_> {
     fn halves(&mut self, samples: usize, with: Halves<'_>) {
-        let ([mut earlier, mut later], clipped) = self.split(samples);
+        let (layout, part, size) = (self.layout, self.part, self.selected().0.container);
+        let (earlier, later) = self.bytes.split_at_mut(samples * size);
+        let half = |bytes| PcmOutput { layout, bytes, clipped: 0, encoded_peak: 0.0, part };
+        let (mut earlier, mut later) = (half(earlier), half(later));
         with(&mut earlier, &mut later);
-        *clipped += earlier.clipped + later.clipped;
+        self.clipped += earlier.clipped + later.clipped;
+        self.encoded_peak = self.encoded_peak.max(earlier.encoded_peak).max(later.encoded_peak);
     }
 }
 

@@ -8,6 +8,7 @@ mod frames;
 mod peak;
 
 pub use frames::{PcmFrames, SampleLayout};
+pub(crate) use peak::peak;
 
 use std::fmt;
 use std::str::FromStr;
@@ -69,8 +70,8 @@ pub enum PcmFormat {
 
 /// The names of [`PcmFormat::ALL`].
 const NAMES: [&str; 20] = [
-    "s8", "u8", "s16le", "s16be", "s24le", "s24be", "s32le", "s32be", "u16le", "u16be", "u32le", "u32be", "s64le",
-    "s64be", "f16le", "f16be", "f32le", "f32be", "f64le", "f64be",
+    "s8", "u8", "s16le", "s16be", "s24le", "s24be", "s32le", "s32be", "u16le", "u16be", "u32le", "u32be",
+    "s64le", "s64be", "f16le", "f16be", "f32le", "f32be", "f64le", "f64be",
 ];
 
 /// A name of no format.
@@ -121,10 +122,7 @@ impl PcmFormat {
 
     /// True for floats: they do not saturate, and they can hold NaN.
     pub const fn is_float(self) -> bool {
-        matches!(
-            self,
-            Self::F16Le | Self::F16Be | Self::F32Le | Self::F32Be | Self::F64Le | Self::F64Be
-        )
+        matches!(self, Self::F16Le | Self::F16Be | Self::F32Le | Self::F32Be | Self::F64Le | Self::F64Be)
     }
 
     /// True for integers that count from 0, whose middle is zero (offset binary).
@@ -311,7 +309,10 @@ mod tests {
     fn integers_of_64_bits_keep_53() {
         for code in [0, 1, -1, 1 << 52, -(1 << 53), 5 << 60, i64::MIN] {
             assert_eq!(PcmFormat::S64Be.decode(&code.to_be_bytes()) * 2f64.powi(63), code as f64);
-            assert_eq!(bytes_of(PcmFormat::S64Le, code as f64 / 2f64.powi(63)), (code.to_le_bytes().to_vec(), false));
+            assert_eq!(
+                bytes_of(PcmFormat::S64Le, code as f64 / 2f64.powi(63)),
+                (code.to_le_bytes().to_vec(), false)
+            );
         }
         assert_eq!(bytes_of(PcmFormat::S64Le, 1.0), (i64::MAX.to_le_bytes().to_vec(), true));
     }

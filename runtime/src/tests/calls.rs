@@ -18,7 +18,10 @@ fn calls_and_banks_that_do_not_fit_are_refused() {
     );
     assert_eq!(stream.process(&[], &mut out), Ok(0));
     let mut output = PcmOutput::packed(PcmFormat::S8, &mut []);
-    assert_eq!(stream.run(&SideBySide::<Zeros>(&[]), &mut output), Err(ProcessError::Channels { given: 0, wanted: 2 }));
+    assert_eq!(
+        stream.run(&SideBySide::<Zeros>(&[]), &mut output),
+        Err(ProcessError::Channels { given: 0, wanted: 2 })
+    );
 
     // More samples than can be counted; the product once wrapped to 0.
     let endless = Zeros { channels: 2, frames: usize::MAX / 2 + 1 };

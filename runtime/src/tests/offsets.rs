@@ -3,8 +3,8 @@
 
 use super::support::{FIR_ALGORITHMS, Noise, fir_bank, precise, random_taps, recursive_bank};
 use crate::{
-    Algorithm, BuildError, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision, SampleLayout, SideBySide,
-    StateSpace, Stream,
+    Algorithm, BuildError, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision, SampleLayout,
+    SideBySide, StateSpace, Stream,
 };
 
 /// Frames of a test: more than two batches of overlap-save with transforms of 64 frames.

@@ -2,8 +2,8 @@
 
 use super::support::{Bank, Noise, by, fir_bank, precise, random_taps, rotation_bank, start};
 use crate::{
-    Algorithm, Interleaved, Options, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, SideBySide, Stream,
-    ThreadPool,
+    Algorithm, Interleaved, Options, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, SideBySide,
+    Stream, ThreadPool,
 };
 
 /// Calls of one thread and of several have the same bits, about calls of `long` frames, and count the same.

@@ -2,8 +2,8 @@
 //! of the samples.
 
 use hybank_runtime::{
-    Algorithm, Input, Interleaved, Options, Output, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision, SideBySide,
-    SampleLayout, Shape, StateSpace, Stream, Zeros,
+    Algorithm, Input, Interleaved, Options, Output, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision,
+    SampleLayout, Shape, SideBySide, StateSpace, Stream, Zeros,
 };
 
 const N: usize = 2;

@@ -1,6 +1,8 @@
 //! Packed floats of this machine's byte order are read and written where they lie; all others are converted.
 
-use hybank_runtime::{Input, Isa, Output, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, SideBySide};
+use hybank_runtime::{
+    Input, Isa, Output, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, SideBySide,
+};
 
 const NATIVE: PcmFormat = PcmFormat::F32Le.native();
 const FOREIGN: PcmFormat = if cfg!(target_endian = "big") { PcmFormat::F32Le } else { PcmFormat::F32Be };

@@ -1,5 +1,16 @@
 use super::*;
+use crate::io::block::NumberFrames;
+use crate::io::{PcmFormat, SampleLayout};
 use crate::random::Random;
+use crate::runtime::PcmFrames;
+
+/// A block of as many frames as the bytes hold.
+fn block(header: &StreamHeader, bytes: &[u8]) -> Block {
+    let mut block = Block::default();
+    block.begin(header);
+    block.decode(&PcmFrames { layout: header.layout, channels: header.channels, bytes }).unwrap();
+    block
+}
 
 /// Frames of big-endian 16-bit samples 0, 1, 2, ..
 fn input(channels: usize, breaks: &[(u64, u64)], dropouts: &[(usize, std::ops::Range<u64>)]) -> AlignedInput {
@@ -23,7 +34,7 @@ fn run(mut input: AlignedInput, frames: usize, block: usize, step: usize) -> Vec
     loop {
         if input.ready() == 0 && !input.ended() {
             match blocks.next() {
-                Some(bytes) => drop(input.refill(Block { bytes: bytes.to_vec(), filled: bytes.len() })),
+                Some(bytes) => drop(input.refill(self::block(&input.header, bytes))),
                 None => input.end(),
             }
             continue;
@@ -33,10 +44,8 @@ fn run(mut input: AlignedInput, frames: usize, block: usize, step: usize) -> Vec
         }
         let count = input.ready().min(step);
         input.prepare(count);
-        let frames = input.view(count);
-        let values =
-            frames.bytes.chunks_exact(frames.layout.container).map(|b| frames.layout.format.decode(b));
-        out.extend(values.map(|x| x.is_finite().then_some((x * 32768.0) as i16)));
+        let NumberFrames::F32(frames) = input.view(count, 1).real else { panic!("16 bits are f32") };
+        out.extend(frames.samples().iter().map(|x| x.is_finite().then_some((x * 32768.0) as i16)));
         input.advance(count);
     }
 }
@@ -59,14 +68,15 @@ fn lost_frames_and_invalid_samples_come_out_as_nan_however_they_are_cut() {
 fn an_input_that_ends_early_leaves_later_timestamps_unreached() {
     let mut short = input(1, &[(9, 4)], &[]);
     assert_eq!(run(input(1, &[(3, 1)], &[]), 3, 2, 9), [Some(0), Some(1), Some(2), None]);
-    let _ = short.refill(Block { bytes: vec![0; 4], filled: 4 });
+    let two = block(&short.header, &[0; 4]);
+    let _ = short.refill(two);
     short.end();
     short.prepare(2);
     short.advance(2);
     assert!(short.is_over() && short.has_unreached_breaks() && short.seen() == 2);
     // From here on all frames are lost.
     short.prepare(5);
-    assert_eq!(short.view(5).frames(), 5);
+    assert_eq!(short.view(5, 1).frames(), 5);
     short.advance(5);
     assert!(short.is_over() && short.seen() == 2);
 }

@@ -1,8 +1,9 @@
 //! Readers that die, time-interleaved converters, and bounds of what may be lost.
 
+use super::super::block::Block;
 use super::super::frames::Message;
 use super::*;
-use crate::io::{Coding, InputFault, PcmFormat, TimeInterleaving};
+use crate::io::{Coding, InputFault, OfflineSamples, PcmFormat, SampleLayout, StatedScale, TimeInterleaving};
 use crossbeam_channel::Sender;
 
 fn raw(channels: usize) -> ReadOptions<'static> {
@@ -11,7 +12,7 @@ fn raw(channels: usize) -> ReadOptions<'static> {
 
 /// A reader of one input whose thread does `send_all`.
 fn reader(
-    send_all: impl FnOnce(Sender<Result<Message, IoError>>, Receiver<Vec<u8>>) + Send + 'static,
+    send_all: impl FnOnce(Sender<Result<Message, IoError>>, Receiver<Block>) + Send + 'static,
 ) -> MultiReader {
     let header = InputSource {
         path: "x".into(),
@@ -20,7 +21,7 @@ fn reader(
         interleaving: None,
         per_frame: 1,
         only: None,
-        full_scale: None,
+        scale: StatedScale::default(),
         block: 4,
     }
     .raw_header();
@@ -33,7 +34,8 @@ fn reader(
 #[test]
 fn a_reader_that_dies_is_an_error_and_not_the_end_of_its_input() {
     let mut reader = reader(|messages, _| {
-        messages.send(Ok(Message::Frames { bytes: vec![1, 2, 3], filled: 3 })).unwrap();
+        let header = StreamHeader::real(SampleLayout::packed(PcmFormat::S8), 1);
+        messages.send(Ok(Message::Frames(Block::missing(&header, 3)))).unwrap();
         // As when it panics: the channel closes without an end.
     });
     assert_eq!(reader.wait(&mut |_| {}).unwrap(), Arrival::Frames(3));
@@ -65,12 +67,10 @@ fn time_interleaved_converters_are_the_channels_of_one_input() {
     let options = ReadOptions { interleaving: Some(&interleaving), ..raw(1) };
     let mut reader = MultiReader::start(&[path], options, &mut |_| {}).unwrap();
     assert_eq!(reader.channels(), 3);
-    let mut bytes: Vec<u8> = Vec::new();
-    while let Arrival::Frames(frames) = reader.wait(&mut |_| {}).unwrap() {
-        bytes.extend(reader.frames()[0].bytes);
-        reader.consume(frames);
-    }
-    assert_eq!(bytes, [2, 0, 1, 5, 3, 4, 8, 6, 7, 11, 9, 10]);
+    let all = OfflineSamples::read(&mut reader, 10).unwrap().channels;
+    let codes: Vec<Vec<f64>> =
+        all.into_iter().map(|all| all.into_iter().map(|x| x * 128.0).collect()).collect();
+    assert_eq!(codes, [[2.0, 5.0, 8.0, 11.0], [0.0, 3.0, 6.0, 9.0], [1.0, 4.0, 7.0, 10.0]]);
     let faults: Vec<_> = reader.warnings().into_iter().map(|warning| warning.fault).collect();
     assert_eq!(faults, [InputFault::CutFrame { bytes: 2 }]);
 }

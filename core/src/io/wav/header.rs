@@ -55,8 +55,8 @@ pub struct WavHeader {
     pub data_offset: u64,
     /// What is said of the recording before the samples.
     pub chunks: Vec<WavChunk>,
-    /// 24 significant bits in 32: writers disagree whether they lie high or low.
-    pub(super) justification_open: bool,
+    /// Bits of a sample that count. By the rule they are the high ones; some writers use the low ones.
+    pub valid_bits: u16,
 }
 
 /// The fmt chunk, as written.
@@ -125,7 +125,7 @@ impl WavHeader {
             data_bytes,
             data_offset: data.offset,
             chunks: Vec::new(),
-            justification_open: layout.container == 4 && fmt.significant_bits() == 24,
+            valid_bits: fmt.significant_bits(),
         })
     }
 }
@@ -218,8 +218,7 @@ impl Fmt {
         if self.valid_bits == 0 || self.valid_bits > self.bits { self.bits } else { self.valid_bits }
     }
 
-    /// Samples of fewer bits than their bytes hold lie in the high bits, so that reading the whole
-    /// container gives the right scale.
+    /// The whole container, in whose high bits samples of fewer bits lie by the rule.
     fn layout<R>(&self, chunks: &Chunks<'_, R>) -> Result<SampleLayout, IoError>
     where
         R: Read,

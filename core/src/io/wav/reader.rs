@@ -2,18 +2,15 @@
 
 use super::chunks::Chunks;
 use super::header::{WavChunk, WavHeader};
-use crate::io::capture::{Capture, InputNotes};
-use crate::io::{IoError, PcmFormat, SampleLayout, StreamHeader};
-use std::io::{self, Chain, Cursor, Read, Take};
-
-/// Number of samples used to distinguish 24 high bits of 32 from 24 low ones.
-const JUSTIFICATION_SAMPLES: usize = 16384;
+use crate::io::capture::{ByteSource, InputNotes};
+use crate::io::{IoError, StreamHeader};
+use std::io::{self, Read, Take};
 
 /// A WAV source, positioned after its header; it reads as the bytes of its samples.
 #[derive(Debug)]
 pub struct WavReader<R> {
     header: WavHeader,
-    data: Take<Chain<Cursor<Vec<u8>>, R>>,
+    data: Take<R>,
     /// Bytes in further data chunks.
     further: u64,
 }
@@ -25,13 +22,8 @@ impl<R: Read> WavReader<R> {
     /// [`IoError`] for anything that is not plain PCM in RIFF, RF64 or BW64.
     pub fn new(inner: R, file: &str) -> Result<Self, IoError> {
         let mut chunks = Chunks::open(inner, file)?;
-        let mut header = WavHeader::read(&mut chunks)?;
-        let mut inner = chunks.into_inner();
-        let peeked = if header.justification_open { peek(&mut inner, &header, file)? } else { Vec::new() };
-        if header.justification_open && lies_low(&peeked) {
-            header.layout = SampleLayout { format: PcmFormat::S24Le, container: 4 };
-        }
-        let data = Cursor::new(peeked).chain(inner).take(header.data_bytes.unwrap_or(u64::MAX));
+        let header = WavHeader::read(&mut chunks)?;
+        let data = chunks.into_inner().take(header.data_bytes.unwrap_or(u64::MAX));
         Ok(Self { header, data, further: 0 })
     }
 
@@ -47,13 +39,14 @@ impl<R: Read> Read for WavReader<R> {
     }
 }
 
-impl<R: Read> Capture for WavReader<R> {
+impl<R: Read> ByteSource for WavReader<R> {
     fn stream_header(&self) -> StreamHeader {
-        let WavHeader { layout, channels, rate, data_bytes, .. } = self.header;
+        let WavHeader { layout, channels, rate, data_bytes, valid_bits, .. } = self.header;
         let promised = data_bytes.map(|bytes| bytes / self.header.frame_bytes() as u64);
         StreamHeader {
             promised,
             is_scaled: true,
+            valid_bits: Some(valid_bits.into()),
             ..StreamHeader::real(layout, channels).at_whole_hertz(rate)
         }
     }
@@ -97,22 +90,4 @@ impl<R: Read> Capture for WavReader<R> {
         }
         chunks
     }
-}
-
-/// The first samples, to be read again.
-fn peek<R: Read>(inner: &mut R, header: &WavHeader, file: &str) -> Result<Vec<u8>, IoError> {
-    let want = (4 * JUSTIFICATION_SAMPLES) as u64;
-    let mut bytes = Vec::new();
-    let mut some = inner.take(header.data_bytes.map_or(want, |size| size.min(want)));
-    some.read_to_end(&mut bytes).map_err(IoError::system(file, "read the samples"))?;
-    Ok(bytes)
-}
-
-/// The rule says that 24 bits in 32 lie high, with a zero byte below; some writers put them low, with the
-/// sign above. They count as low only if the zero byte is not zero and the sign extension fits in all
-/// samples.
-fn lies_low(bytes: &[u8]) -> bool {
-    let mut samples = bytes.chunks_exact(4);
-    let sign_above = samples.all(|b| b[3] == if b[2] & 0x80 == 0 { 0 } else { 0xFF });
-    sign_above && bytes.chunks_exact(4).any(|b| b[0] != 0)
 }

@@ -1,7 +1,8 @@
 //! Headers as they are found in the wild, hound as the oracle for the tame ones.
 
 use super::*;
-use crate::io::capture::Capture;
+use crate::io::capture::ByteSource;
+use crate::io::{FrameFile, MultiReader, OfflineSamples, ReadOptions};
 use crate::io::{InputFault, IoError, PcmFormat, SampleLayout};
 use proptest::prelude::*;
 use std::io::{self, Cursor, Read, Seek, SeekFrom, Write};
@@ -214,14 +215,27 @@ fn fewer_bits_than_bytes_lie_high() {
 }
 
 #[test]
-fn twenty_four_bits_in_four_bytes_are_found_high_or_low() {
-    let values: [i32; 6] = [0x123456, -0x123456, 1, -1, 0x7FFFFF, -0x800000];
-    let want: Vec<f64> = values.iter().map(|&v| f64::from(v) / 8388608.0).collect();
-    for fmt in [fmt(1, 1, 4, 24), extensible(1, 1, 4, 32, 24)] {
-        let high: Vec<u8> = values.iter().flat_map(|v| (v << 8).to_le_bytes()).collect();
-        let low: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-        for data in [high, low] {
-            assert_eq!(read(&riff(&[chunk(b"fmt ", &fmt), chunk(b"data", &data)])).unwrap().1, want);
+fn fewer_bits_than_bytes_are_found_high_or_low() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.wav");
+    for (bytes, valid) in [(4, 24), (4, 20), (4, 16), (3, 20), (2, 12), (2, 14)] {
+        let full = 1i32 << (valid - 1);
+        let values = [0x123, -0x123, 1, -1, full - 1, -full];
+        let want: Vec<f64> = values.iter().map(|&v| f64::from(v) / f64::from(full)).collect();
+        let plain = (u32::from(valid).div_ceil(8) <= bytes).then(|| fmt(1, 1, bytes as u16, valid));
+        let fmts = [Some(extensible(1, 1, bytes as u16, 8 * bytes as u16, valid)), plain];
+        for fmt in fmts.into_iter().flatten() {
+            for shift in [0, 8 * bytes - u32::from(valid)] {
+                let word = |v: &i32| (v << shift).to_le_bytes()[..bytes as usize].to_vec();
+                let data: Vec<u8> = values.iter().flat_map(word).collect();
+                std::fs::write(&path, riff(&[chunk(b"fmt ", &fmt), chunk(b"data", &data)])).unwrap();
+                let mut reader =
+                    MultiReader::start(&[path.clone()], ReadOptions::files(), &mut |_| {}).unwrap();
+                let samples = OfflineSamples::read(&mut reader, 10).unwrap().channels;
+                assert_eq!(samples, [want.clone()], "{valid} of {bytes} bytes, shifted by {shift}");
+                let spans = FrameFile::open(&path).unwrap().read::<f64>(1, 9).unwrap();
+                assert_eq!(spans, want[1..], "{valid} of {bytes} bytes, shifted by {shift}");
+            }
         }
     }
 }

@@ -132,9 +132,9 @@ fn whatever_the_blocks_the_samples_and_marks_are_the_same() {
             assert_eq!(run(&mut gaps, &samples, block), want, "blocks of {block}");
             assert_eq!(gaps.summary(), whole.summary());
         }
-        let recordings = &[PcmFrames { layout, channels: 2, bytes: &bytes }][..];
+        let recording = PcmFrames { layout, channels: 2, bytes: &bytes };
         let mut gaps = filler(&bank, 5, 1);
-        let out = gaps.fill(&[Frames::new(&recordings, 0..200)]);
+        let out = gaps.fill(&[Frames::new(&recording, 0..200)]);
         assert_eq!((out, gaps.held()), (195, 5));
         assert_eq!(gaps.filled(0), &want.0[..390]);
     }

@@ -4,7 +4,7 @@ use crate::io::{PcmFormat, PcmFrames, SampleLayout};
 use crate::pipeline::gaps::tests::Mean;
 use crate::pipeline::{Block, DroppedLatency, GapEstimator, Pipeline};
 use crate::random::Random;
-use crate::runtime::{Algorithm, Interleaved, Options, PcmOutput, Planar, Stream, Zeros};
+use crate::runtime::{Algorithm, Interleaved, Options, PcmOutput, Planar, SideBySide, Stream, Zeros};
 use crate::units::Seconds;
 use std::cell::Cell;
 use std::sync::Arc;
@@ -36,11 +36,11 @@ fn channels(frames: usize, gap: bool) -> [Vec<f32>; 2] {
     both
 }
 
-/// As `hybank fuse` does it: blocks of `block` frames of `recordings`, with as many outputs as frames.
+/// As `hybank fuse` does it: blocks of frames, with as many outputs as frames.
 fn command(
     bank: &Bank,
     plan: &Plan,
-    recordings: &[PcmFrames<'_>],
+    parts: &[&dyn Input],
     settings: Settings<'_>,
     (format, is_complex): (PcmFormat, bool),
 ) -> (Written, Outcome) {
@@ -51,8 +51,8 @@ fn command(
         written.mask.extend_from_slice(block.mask.unwrap_or_default());
         Ok(())
     };
-    pipeline.push(recordings, &mut write).unwrap();
-    pipeline.flush((recordings.frames() * bank.ratio) as u64, &mut write).unwrap();
+    pipeline.push_parts(parts, &mut write).unwrap();
+    pipeline.flush((parts[0].frames() * bank.ratio) as u64, &mut write).unwrap();
     (written, pipeline.finish())
 }
 
@@ -87,7 +87,8 @@ fn a_whole_signal_has_the_bits_of_the_command() {
             let stored = both.each_ref().map(|x| x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>());
             let layout = SampleLayout::packed(PcmFormat::F32Le);
             let recordings = stored.each_ref().map(|bytes| PcmFrames { layout, channels: 1, bytes });
-            let (want, outcome) = command(&bank, &plan, &recordings, settings.clone(), (format, false));
+            let (want, outcome) =
+                command(&bank, &plan, &[&SideBySide(&recordings)], settings.clone(), (format, false));
             let planes = both.each_ref().map(Vec::as_slice);
             let mut bytes = vec![0; frames * ratio * format.bytes()];
             let mut output = PcmOutput::packed(format, &mut bytes);
@@ -116,9 +117,9 @@ fn complex_samples_with_gaps_have_the_bits_and_gaps_of_the_command() {
     let bytes: Vec<u8> = samples.iter().flat_map(|x| x.to_le_bytes()).collect();
     let recording = PcmFrames { layout: SampleLayout::packed(PcmFormat::F32Le), channels: 4, bytes: &bytes };
     let settings = Settings { gaps: Some(mean()), ..Settings::default() };
-    let (want, outcome) = command(&bank, &plan, &[recording], settings.clone(), (PcmFormat::F32Le, true));
-    let (real, imaginary) = ([recording.part(0)], [recording.part(1)]);
-    let parts: [&dyn Input; 2] = [&real.as_slice(), &imaginary.as_slice()];
+    let (real, imaginary) = (recording.part(0), recording.part(1));
+    let parts: [&dyn Input; 2] = [&real, &imaginary];
+    let (want, outcome) = command(&bank, &plan, &parts, settings.clone(), (PcmFormat::F32Le, true));
     let mut bytes = vec![0; want.samples.len()];
     let mut output = PcmOutput::packed(PcmFormat::F32Le, &mut bytes);
     let whole = fuse(&bank, &plan, &parts, &mut output, settings, NEVER).unwrap();

@@ -2,7 +2,7 @@ use super::super::gaps::tests::Mean;
 use super::super::{DroppedLatency, GapEstimator};
 use super::*;
 use crate::bank::SynthesisFilters;
-use crate::io::SampleLayout;
+use crate::io::{PcmFrames, SampleLayout};
 use crate::random::Random;
 use crate::runtime::{Algorithm, Options, Stream};
 use crate::units::Seconds;
@@ -62,13 +62,17 @@ fn only_samples_of_the_output_are_counted_as_clipped() {
             // Pieces of 3 frames, so that borders of blocks and of what is kept meet in all ways.
             for piece in bytes.chunks(8 * 3) {
                 let layout = SampleLayout::packed(PcmFormat::F32Le);
-                let recordings = [PcmFrames { layout, channels: 2, bytes: piece }];
-                pipeline.push(&recordings, &mut append(&mut got)).unwrap();
+                let frames = PcmFrames { layout, channels: 2, bytes: piece };
+                pipeline.push_parts(&[&frames], &mut append(&mut got)).unwrap();
             }
             pipeline.flush(samples as u64, &mut append(&mut got)).unwrap();
             let mut want = vec![0; samples * format.bytes()];
             let kept = all[skip..skip + samples].iter().zip(want.chunks_exact_mut(format.bytes()));
             let clipped: u64 = kept.map(|(&x, slot)| u64::from(format.encode(x, slot))).sum();
+            assert_eq!(
+                pipeline.peak(),
+                all[skip..skip + samples].iter().fold(0.0, |peak: f64, x| peak.max(x.abs()))
+            );
             let outcome = pipeline.finish();
             assert_eq!((outcome.samples, outcome.clipped), (samples as u64, clipped), "{m} {skip} {format}");
             assert!(got == want, "{m} {skip} {format}");
@@ -88,8 +92,8 @@ fn complex(input: &[[f32; 2]], gaps: Option<Arc<dyn GapEstimator>>) -> (Vec<f32>
     let mut output = Vec::new();
     for piece in bytes.chunks(16 * 3) {
         let layout = SampleLayout::packed(PcmFormat::F32Le);
-        let recordings = [PcmFrames { layout, channels: 4, bytes: piece }];
-        pipeline.push(&recordings, &mut append(&mut output)).unwrap();
+        let frames = PcmFrames { layout, channels: 4, bytes: piece };
+        pipeline.push_parts(&[&frames.part(0), &frames.part(1)], &mut append(&mut output)).unwrap();
     }
     let samples = pipeline.samples() + pipeline.pending() + 2;
     pipeline.flush(samples, &mut append(&mut output)).unwrap();
