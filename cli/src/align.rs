@@ -10,7 +10,7 @@ use super::print::{Failure, check_json, failed, failed_at, is_dash, say_understo
 use super::written::{Mono, begin_file, begin_recording, check_outputs, write_text, write_together};
 use hybank::align::{AlignError, AlignSettings, AlignedChannel, Alignment, Step, align};
 use hybank::calibrate::{CalibrateError, Record};
-use hybank::captures::Captures;
+use hybank::captures::{Captures, Converters};
 use hybank::figures::Alone;
 use hybank::io::{Container, PcmFormat, ReadOptions};
 use hybank::pipeline::matching::{check_rate, common_rate};
@@ -138,11 +138,11 @@ impl Args {
             return Err(failed(CalibrateError::ChannelCount { channels, records: captures }));
         }
         let own = self.reading.format().options(captures, channels);
-        let options = ReadOptions { full_scale: own.full_scale.or(spec.full_scale), ..own };
+        let scale = Converters::from(spec).scale(own.scale.given);
+        let options = ReadOptions { scale, ..own };
         let (mut records, mut formats, mut headers) = (Vec::new(), Vec::new(), Vec::new());
         for path in &self.captures {
             let mut reader = start(std::slice::from_ref(path), options)?;
-            self.reading.scale.check(&reader)?;
             check_rate(spec, &reader).map_err(failed)?;
             let Some(header) = reader.headers().next().map(|(_, header)| *header) else { continue };
             headers.push((path.display().to_string(), header));

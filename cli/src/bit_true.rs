@@ -5,14 +5,13 @@ use super::observer::RunObserver;
 use super::output::begin_samples;
 use super::print::{Failure, check_strict, failed, name, print, print_report, stopped, warn};
 use super::run::{Job, each_block};
-use hybank::bank::Bank;
 use hybank::files::commit_all;
 use hybank::interchange::{BitTrue, WordSizes};
-use hybank::io::{Container, MultiReader, OutputHeader, PcmFormat, PcmFrames, SampleWriter};
+use hybank::io::{Container, MultiReader, OutputHeader, PcmFormat, RecordedFrames, SampleWriter};
 use hybank::messages::Quoted;
 use hybank::overview::BeforeAfter;
 use hybank::pipeline::DroppedLatency;
-use hybank::runtime::{Input, Isa};
+use hybank::runtime::{Input, Isa, SideBySide};
 
 /// The options.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -62,14 +61,15 @@ impl BitTrueArgs {
     ) -> Result<(), Failure> {
         let rate = job.output_rate(reader)?;
         let format = integer_format(reader)?;
-        let bits = 8 * format.bytes() as u32;
+        let bits = converter_bits(reader).unwrap_or(8 * format.bytes() as u32);
         let words = WordSizes { input: bits, accumulator: self.accumulator.into(), output: bits };
         let model = BitTrue::new(job.bank, words)
             .map_err(|error| Failure::Input(format!("{}: {error}", name(job.bank_path))))?;
         let header = OutputHeader { container: Container::Wav, format, is_complex: false, rate };
         let output = begin_samples(job.output, header, job.args.force).map_err(stopped)?;
         let skip = if job.dropped == DroppedLatency::All { job.bank.output_delay() } else { 0 };
-        let mut run = Run::new(model, output, format, skip, job.bank);
+        let mut run =
+            Run { model, output, format, bits, skip, owed: skip, ratio: job.bank.ratio, samples: 0 };
         each_block(reader, observer, |_, recordings| run.process(recordings))?;
         let frames = reader.consumed();
         run.flush()?;
@@ -132,11 +132,20 @@ fn integer_format(reader: &MultiReader) -> Result<PcmFormat, Failure> {
     }
 }
 
+/// The bits of the converters, whose codes reach 1 - 2^(1 - bits) of full scale.
+fn converter_bits(reader: &MultiReader) -> Option<u32> {
+    let (_, header) = reader.headers().next()?;
+    let (_, highest) = header.rails?;
+    Some((1.0 - (1.0 - highest).log2()).round() as u32)
+}
+
 /// A model that runs.
 struct Run {
     model: BitTrue,
     output: SampleWriter,
     format: PcmFormat,
+    /// Of the converters.
+    bits: u32,
     /// Output samples that are still to be dropped.
     skip: usize,
     /// The latency that is dropped, and made up for at the end.
@@ -146,10 +155,6 @@ struct Run {
 }
 
 impl Run {
-    fn new(model: BitTrue, output: SampleWriter, format: PcmFormat, skip: usize, bank: &Bank) -> Self {
-        Self { model, output, format, skip, owed: skip, ratio: bank.ratio, samples: 0 }
-    }
-
     /// Frames without a signal, until M samples have come out for each frame of the captures.
     fn flush(&mut self) -> Result<(), Failure> {
         let (frames, resting) = (self.owed.div_ceil(self.ratio), self.model.resting());
@@ -158,9 +163,11 @@ impl Run {
         self.write(&fast)
     }
 
-    fn process(&mut self, recordings: &[PcmFrames<'_>]) -> Result<(), Failure> {
-        let mut numbers = vec![0.0f64; recordings.frames() * recordings.channels()];
-        recordings.load_f64(Isa::detect(), 0, &mut numbers);
+    fn process(&mut self, recordings: &[RecordedFrames<'_>]) -> Result<(), Failure> {
+        let parts: Vec<_> = recordings.iter().map(|recording| recording.real).collect();
+        let all = SideBySide::new(parts);
+        let mut numbers = vec![0.0f64; all.frames() * all.channels()];
+        all.load_f64(Isa::detect(), 0, &mut numbers);
         // A power of two: the product is the integer itself.
         let frames: Vec<i32> = numbers.iter().map(|x| (x * self.full_scale()) as i32).collect();
         let fast = self.model.filtered(&frames);
@@ -169,7 +176,7 @@ impl Run {
 
     /// The integer that stands for 1.
     fn full_scale(&self) -> f64 {
-        (8.0 * self.format.bytes() as f64 - 1.0).exp2()
+        (f64::from(self.bits) - 1.0).exp2()
     }
 
     fn write(&mut self, fast: &[i32]) -> Result<(), Failure> {

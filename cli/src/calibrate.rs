@@ -229,7 +229,6 @@ impl Args {
         let interleaving = self.interleaved.interleaving(&converters, &self.spec)?;
         let options = converters.options(self.reading.format(), paths.len(), interleaving.as_ref());
         let mut reader = start(paths, options)?;
-        self.reading.scale.check(&reader)?;
         check_channels(converters.layout(), "the spec", &reader).map_err(failed)?;
         check_rate(spec, &reader).map_err(failed)?;
         let parts = if reader.is_complex() { 2 } else { 1 };

@@ -5,7 +5,7 @@ use super::output::WAV;
 use super::print::{Failure, failed, failed_at, is_dash};
 use hybank::bank::Bank;
 use hybank::captures::{Converters, FileFormat};
-use hybank::io::{Coding, MultiReader, ReadOptions, TimeInterleaving};
+use hybank::io::{Coding, MultiReader, ReadOptions, StatedScale, TimeInterleaving};
 use hybank::messages::Quoted;
 use hybank::pipeline::matching::{self, NotInTurn};
 use hybank::quantity::{self, FullScale};
@@ -63,7 +63,7 @@ impl CaptureArgs {
         match (ending(file), ending(reference)) {
             (own_ending, ending) if own_ending == ending => own,
             (_, ending) if WAV.iter().any(|known| ending == *known) => ReadOptions::files(),
-            _ => ReadOptions { full_scale: None, ..own },
+            _ => ReadOptions { scale: StatedScale::default(), ..own },
         }
     }
 
@@ -92,12 +92,12 @@ pub(super) fn check_channels(channels: Option<u16>, format: Coding) -> Result<()
 /// The full scale of captures.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(super) struct ScaleArgs {
-    /// Full scale of captures whose format does not say it, such as tables and floats that are not WAV: a
-    /// number (128, 2.5), or the codes of a converter: 8bits from -128 to 127, u8bits from 0 to 255
-    /// [default: that of the spec, or 1]
+    /// Full scale of the converters: the codes of 12bits from -2048 to 2047, of u12bits from 0 to 4095, in
+    /// words of any size, or a number (128, 2.5) [default: that of WAV and FLAC files, else that of the spec
+    /// or its bits, else all bits of integers, or 1]
     #[arg(long, value_name = "X", value_parser = quantity::full_scale)]
     full_scale: Option<FullScale>,
-    /// Bits of a converter whose codes such captures are: --full-scale 8bits is the same as 8
+    /// Bits of the converters: --full-scale 12bits is the same as 12
     #[arg(long, value_name = "B", value_parser = codes, conflicts_with = "full_scale")]
     sample_bits: Option<FullScale>,
 }
@@ -114,24 +114,6 @@ impl ScaleArgs {
     /// The full scale, if it is given.
     pub(super) fn given(self) -> Option<FullScale> {
         self.full_scale.or(self.sample_bits)
-    }
-
-    /// Refuses a full scale for captures none of which lacks one.
-    pub(super) fn check(self, reader: &MultiReader) -> Result<(), Failure> {
-        check_scale(self.given(), reader)
-    }
-}
-
-/// Refuses a full scale on the command line for captures none of which lacks one.
-pub(super) fn check_scale(given: Option<FullScale>, reader: &MultiReader) -> Result<(), Failure> {
-    match (given, reader.headers().next()) {
-        (Some(scale), Some((input, _))) if reader.headers().all(|(_, header)| header.is_scaled) => {
-            Err(Failure::Usage(format!(
-                "--full-scale {scale}: {} states its full scale by its format; leave the option out",
-                Quoted(input)
-            )))
-        }
-        _ => Ok(()),
     }
 }
 

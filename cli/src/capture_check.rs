@@ -4,7 +4,7 @@ use hybank::bank::Bank;
 use hybank::calibrate::{
     Agreement, ENOUGH_FRAMES, Record, Verdict, agreement, comparable, frames_for_agreement,
 };
-use hybank::io::{OfflineSamples, PcmFrames};
+use hybank::io::{OfflineSamples, RecordedFrames};
 use hybank::spec::Spec;
 use std::thread::{Builder, JoinHandle};
 
@@ -37,7 +37,7 @@ impl CaptureCheck {
     }
 
     /// Takes the frames of a block until there are enough.
-    pub(super) fn observe(&mut self, recordings: &[PcmFrames<'_>]) {
+    pub(super) fn observe(&mut self, recordings: &[RecordedFrames<'_>]) {
         let Self::Collecting { samples, frames, .. } = self else { return };
         let missing = *frames - samples.first().map_or(0, Vec::len);
         let Ok(OfflineSamples { channels: block, .. }) = OfflineSamples::of_frames(recordings, missing)

@@ -1,6 +1,5 @@
 //! Recordings in memory, with what must be known about their format.
 
-use super::capture_args::check_scale;
 use super::file_kind::unreadable;
 use super::print::{Failure, failed, failed_at, is_dash, name, warn};
 use hybank::captures::{CaptureError, Captures, ChannelSamples};
@@ -44,7 +43,6 @@ impl CaptureFile {
     /// Reads a recording; `-` is standard input.
     pub(super) fn read(path: &Path, reading: Reading) -> Result<Self, Failure> {
         let mut reader = start(&[path.to_owned()], reading.options)?;
-        check_scale(reading.options.full_scale, &reader)?;
         Captures::check_mono(&reader).map_err(unread)?;
         if !reading.takes_complex {
             check_real(&reader).map_err(failed)?;

@@ -137,7 +137,6 @@ impl Args {
             output: &self.output,
             container: Container::Wav,
             format: self.bits,
-            scale: self.reading.scale,
             dropped: if self.keep_latency { DroppedLatency::Added } else { DroppedLatency::All },
             is_live: false,
             flush: true,

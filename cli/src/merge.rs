@@ -136,7 +136,6 @@ impl Args {
 
     fn recorded(&self, path: &Path, warnings: &mut Vec<String>) -> Result<Source, Failure> {
         let mut reader = start(&[path.to_path_buf()], self.reading.format().options(1, 1))?;
-        self.reading.scale.check(&reader)?;
         Captures::check_mono(&reader).map_err(unread)?;
         let format = reader.headers().next().map(|(_, header)| header.layout.format);
         let captures = Captures::read(&mut reader, usize::MAX).map_err(unread)?;

@@ -4,11 +4,11 @@
 use super::capture_check::CaptureCheck;
 use super::event_file::EventFile;
 use super::print::{Failure, is_dash, say_line};
+use super::run::frames_of;
 use hybank::bank::Bank;
 use hybank::calibrate::{Agreement, Verdict};
-use hybank::io::{PcmFrames, Stall};
+use hybank::io::{RecordedFrames, Stall};
 use hybank::pipeline::{Gap, Pipeline};
-use hybank::runtime::Input;
 use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -187,11 +187,11 @@ impl RunObserver {
     }
 
     /// Reports what happened since the last call, with the frames of this step.
-    pub(super) fn step(&mut self, recordings: &[PcmFrames<'_>], pipeline: &Pipeline<'_>) {
+    pub(super) fn step(&mut self, recordings: &[RecordedFrames<'_>], pipeline: &Pipeline<'_>) {
         self.check.iter_mut().for_each(|check| check.observe(recordings));
         self.tell_news();
         let now = Counts {
-            frames: self.written.frames + recordings.frames() as u64,
+            frames: self.written.frames + frames_of(recordings),
             samples: pipeline.samples(),
             gaps: pipeline.gaps().len(),
             replaced: pipeline.replaced(),

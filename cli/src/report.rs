@@ -96,7 +96,6 @@ impl Args {
         let interleaving = self.interleaved.interleaving(&converters, &self.bank)?;
         let options = converters.options(self.reading.format(), self.inputs.len(), interleaving.as_ref());
         let mut reader = start(&self.inputs, options)?;
-        self.reading.scale.check(&reader)?;
         let rate = Hertz(output_rate(bank, &self.bank, &reader)?);
         check_real(&reader).map_err(failed)?;
         let captures = Captures::read(&mut reader, MOST_FRAMES).map_err(unread)?;

@@ -1,6 +1,6 @@
 //! How `fuse` and `stream` run a bank: their common options, the run from its plan to its files, the report.
 
-use super::capture_args::{InterleavedArgs, ScaleArgs, check_stdin, output_rate};
+use super::capture_args::{InterleavedArgs, check_stdin, output_rate};
 use super::file_kind::unreadable;
 use super::gaps::{GapArgs, say_gaps};
 use super::interrupt::interrupts;
@@ -11,11 +11,11 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hybank::bank::Bank;
 use hybank::captures::{Converters, FileFormat};
 use hybank::io::{
-    Arrival, BLOCK_BYTES, Container, MultiReader, OnStall, OutputHeader, OutputNotes, PcmFormat, PcmFrames,
-    Placement, ReadOptions, is_sigmf,
+    Arrival, BLOCK_BYTES, Container, MultiReader, OnStall, OutputHeader, OutputNotes, PcmFormat, Placement,
+    ReadOptions, RecordedFrames, is_sigmf,
 };
 use hybank::pipeline::{DroppedLatency, FileOutputs, Outcome, Pipeline, Settings, Warning};
-use hybank::runtime::{Algorithm, Input, Options, Plan, Precision, ThreadPool};
+use hybank::runtime::{Algorithm, Options, Plan, Precision, ThreadPool};
 use std::path::{Path, PathBuf};
 
 /// Options of the commands that fuse.
@@ -102,7 +102,6 @@ pub(super) struct Job<'a> {
     pub(super) output: &'a Path,
     pub(super) container: Container,
     pub(super) format: PcmFormat,
-    pub(super) scale: ScaleArgs,
     pub(super) dropped: DroppedLatency,
     /// Samples are fused as they arrive: no algorithm may add latency, an interrupt ends the run in order,
     /// and warnings come at once.
@@ -144,9 +143,7 @@ impl Job<'_> {
         let own = converters.options(format, inputs.len(), interleaving.as_ref());
         let files = args.gaps.read_options(lost.as_ref(), ReadOptions { block_bytes, ..own });
         let started = MultiReader::start(inputs, files, on_stall);
-        let reader = started.map_err(unreadable)?;
-        self.scale.check(&reader)?;
-        Ok(reader)
+        started.map_err(unreadable)
     }
 
     fn options(&self) -> Options {
@@ -203,7 +200,7 @@ impl Job<'_> {
         let is_interrupted = self.all_frames(reader, &mut pipeline, &mut outputs, observer, each)?;
         let latency = pipeline.plan().latency();
         let dropped = self.dropped.samples(pipeline.plan());
-        let outcome = self.drain(pipeline, reader.consumed(), &mut outputs)?;
+        let (outcome, peak) = self.drain(pipeline, reader.consumed(), &mut outputs)?;
         let checked = observer.checked();
         // A frame may hold several samples of a converter.
         let outcome = Outcome { channels: self.bank.channel_count(), ..outcome };
@@ -213,7 +210,6 @@ impl Job<'_> {
         let (ratio, samples) = (self.bank.ratio as u64, report.outcome.samples);
         let placement = Placement { ratio, per_frame: 1, shift, samples };
         outputs.annotate(self.notes(reader, &report, placement)?);
-        let peak = outputs.peak();
         self.complete(outputs, &report, observer)?;
         let frames = reader.consumed();
         Ok(Finished { report, frames, is_interrupted, dropped, peak, captures: checked.summary() })
@@ -225,7 +221,7 @@ impl Job<'_> {
         let mask = args.gaps.begin_mask(args.force)?;
         let header = OutputHeader { container, format, is_complex, rate };
         let samples = begin_samples(self.output, header, args.force).map_err(stopped)?;
-        Ok(FileOutputs::new(samples, mask, format))
+        Ok(FileOutputs::new(samples, mask))
     }
 
     /// Processes all frames; true if an interrupt ended them.
@@ -240,7 +236,7 @@ impl Job<'_> {
         each_block(reader, observer, |observer, recordings| {
             pipeline.push(recordings, &mut |block| outputs.write(block)).map_err(stopped)?;
             observer.step(recordings, pipeline);
-            each(recordings.frames() as u64);
+            each(frames_of(recordings));
             Ok(())
         })
     }
@@ -252,7 +248,7 @@ impl Job<'_> {
         mut pipeline: Pipeline<'_>,
         frames: u64,
         outputs: &mut FileOutputs,
-    ) -> Result<Outcome, Failure> {
+    ) -> Result<(Outcome, f64), Failure> {
         let so_far = pipeline.samples() + pipeline.pending();
         let samples = match (self.is_live, self.flush) {
             (false, _) => frames * self.bank.ratio as u64,
@@ -260,7 +256,8 @@ impl Job<'_> {
             (true, false) => so_far,
         };
         pipeline.flush(samples, &mut |block| outputs.write(block)).map_err(stopped)?;
-        Ok(pipeline.finish())
+        let peak = pipeline.peak();
+        Ok((pipeline.finish(), peak))
     }
 
     fn tolerated(&self, reader: &MultiReader) -> Vec<Warning> {
@@ -311,11 +308,16 @@ impl Job<'_> {
     }
 }
 
+/// Frames that all recordings have.
+pub(super) fn frames_of(recordings: &[RecordedFrames<'_>]) -> u64 {
+    recordings.iter().map(RecordedFrames::frames).min().unwrap_or(0) as u64
+}
+
 /// Hands over all frames, block by block; true if an interrupt ended them.
 pub(super) fn each_block(
     reader: &mut MultiReader,
     observer: &mut RunObserver,
-    mut take: impl FnMut(&mut RunObserver, &[PcmFrames<'_>]) -> Result<(), Failure>,
+    mut take: impl FnMut(&mut RunObserver, &[RecordedFrames<'_>]) -> Result<(), Failure>,
 ) -> Result<bool, Failure> {
     loop {
         match reader.wait(&mut |stall| observer.stalled(stall)).map_err(stopped)? {

@@ -116,7 +116,6 @@ impl Args {
             container: self.container(),
             // A WAV stream has 32-bit floats.
             format: self.output_coding().format().unwrap_or(PcmFormat::F32Le),
-            scale: self.scale,
             dropped: DroppedLatency::Nothing,
             is_live: true,
             flush: self.flush,

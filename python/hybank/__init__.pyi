@@ -163,7 +163,15 @@ class Bank:
     def front_end_gains(self, n: int = 512) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
     def pictures(self) -> dict[str, dict[str, Any]]: ...
     def plot(self, ax: Any = None, picture: str = "error") -> Any: ...
-    def report(self, path: _Path, captures: Any = None, *, axis: int = -1, overwrite: bool = True) -> None: ...
+    def report(
+        self,
+        path: _Path,
+        captures: Any = None,
+        *,
+        axis: int = -1,
+        overwrite: bool = True,
+        full_scale: float | str | None = None,
+    ) -> None: ...
     @overload
     def fuse(
         self,
@@ -178,6 +186,7 @@ class Bank:
         interleaved: int | None = None,
         rate: float | None = None,
         full_output: Literal[False] = False,
+        full_scale: float | str | None = None,
     ) -> NDArray[Any]: ...
     @overload
     def fuse(
@@ -193,6 +202,7 @@ class Bank:
         interleaved: int | None = None,
         rate: float | None = None,
         full_output: Literal[True],
+        full_scale: float | str | None = None,
     ) -> tuple[NDArray[Any], FuseReport]: ...
     def fuse_as_hardware(
         self, x: NDArray[np.signedinteger[Any]], *, accumulator: int = 64, axis: int = -1, keep_latency: bool = False
@@ -205,6 +215,7 @@ class Bank:
         algorithm: _Algorithm = "auto",
         state: bytes | None = None,
         gaps: bool = False,
+        full_scale: float | str | None = None,
     ) -> Stream: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __copy__(self) -> Bank: ...
@@ -362,6 +373,7 @@ def calibrate(
     clip: float | None = None,
     interleaved: int | None = None,
     axis: int = -1,
+    full_scale: float | str | None = None,
 ) -> Calibration: ...
 @overload
 def measure(
@@ -372,7 +384,7 @@ def measure(
     tones: _Values | None = None,
     interleaved: int = 1,
     harmonics: int = 10,
-    full_scale: float = 1.0,
+    full_scale: float | str | None = None,
     window: Literal["none", "hann", "bh4", "bh7"] = "bh7",
     skip: int = 0,
 ) -> Measurement: ...
@@ -385,7 +397,7 @@ def measure(
     tones: None = None,
     interleaved: int = 1,
     harmonics: int = 10,
-    full_scale: float = 1.0,
+    full_scale: float | str | None = None,
     window: Literal["none", "hann", "bh4", "bh7"] = "bh7",
     skip: int = 0,
 ) -> Comparison: ...

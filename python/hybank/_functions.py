@@ -203,7 +203,7 @@ def align(x, spec, *, reference=None, within=None, axis=-1):
 @checked
 def calibrate(
     x, spec, *, tones=None, waveform=None, rate=None, blind=False, fit=("delay", "gain", "offset"), reference=None,
-    clip=None, interleaved=None, axis=-1
+    clip=None, interleaved=None, axis=-1, full_scale=None
 ):
     """Delays, gains and offsets of the channels from captures, with their standard deviations.
 
@@ -232,6 +232,8 @@ def calibrate(
         x is one recording in which so many converters take turns.
     axis : int
         The axis of time.
+    full_scale : float or str, optional
+        Full scale of the converters: "12bits", "u12bits" or a number; that of the spec or its bits if left out.
 
     Returns
     -------
@@ -247,12 +249,12 @@ def calibrate(
     need_numbers(rate=rate)
     # A spec may be a mapping or a path; the order of its converters is that of their delays.
     x, axis = _inputs.plain(x, axis, spec, interleaved)
-    return _hybank.calibrate(x, spec, tones, waveform, rate, blind, list(fit), reference, clip, axis)
+    return _hybank.calibrate(x, spec, tones, waveform, rate, blind, list(fit), reference, clip, axis, full_scale)
 
 
 @checked
 def measure(
-    y, rate=None, *, ref=None, tones=None, interleaved=1, harmonics=10, full_scale=1.0, window="bh7", skip=0
+    y, rate=None, *, ref=None, tones=None, interleaved=1, harmonics=10, full_scale=None, window="bh7", skip=0
 ):
     """The quality of a record of a tone, or its error against a reference.
 
@@ -270,8 +272,8 @@ def measure(
         Converters that take turns in the record: tells which spurs are interleaving spurs.
     harmonics : int
         Highest order of the harmonics in THD.
-    full_scale : float
-        Amplitude of full scale of floats.
+    full_scale : float or str, optional
+        Full scale of the converter: "12bits", "u12bits" or a number; figures are those of samples of full scale 1.
     window : {"bh7", "bh4", "hann", "none"}
         Window of the spectrum.
     skip : int
@@ -299,7 +301,7 @@ def measure(
     if tones is not None:
         raise _hybank.HybankError("tones: a comparison measures no tones; call measure without ref for them")
     ref, _ = _inputs.record(ref, rate)
-    found, spectrum = _hybank.compare(y, ref, rate, window, skip)
+    found, spectrum = _hybank.compare(y, ref, rate, window, skip, full_scale)
     return Comparison(**dict(found), spectrum=spectrum)
 
 

@@ -67,7 +67,7 @@ def read(
     channel : int, optional
         Read only this channel of each file, from 1.
     full_scale : float or str, optional
-        Full scale of files whose format does not say it: a number, or "8bits", "u8bits".
+        Full scale of the converters: a number, or "12bits", "u12bits". WAV and FLAC state it, the bank may.
     sample_bits : int, optional
         The same as ``full_scale="<B>bits"``.
     interleaved : int, optional
@@ -99,7 +99,7 @@ def read(
         raise HybankError("interleaved: give the bank, whose delays say in which order the converters take turns")
     options = {
         "format": format, "channels": channels, "channel": channel,
-        "full_scale": None if full_scale is None else str(full_scale), "interleaved": interleaved,
+        "full_scale": full_scale, "interleaved": interleaved,
         "lost": lost, "max_lost": max_lost, "longest": longest,
     }
     return _read(files, bank, options)
@@ -119,7 +119,7 @@ def _read(files, source, options):
 def fuse(bank, x, interleaved, *, axis, full_output, rate, **keywords):
     """``Bank.fuse`` of what is no array of NumPy."""
     if _are_files(x):
-        x, interleaved = read(x, bank=bank, interleaved=interleaved), None
+        x, interleaved = read(x, bank=bank, interleaved=interleaved, full_scale=keywords.pop("full_scale")), None
         # As `hybank fuse` writes it: 32-bit floats.
         keywords["dtype"] = "f4" if keywords["dtype"] is None else keywords["dtype"]
         rate = x.output_rate if rate is None else rate
@@ -188,7 +188,7 @@ def recordings(x, axis, source):
     return list(np.asarray(x).T if axis in (0, -2) else x)
 
 
-def channels(bank, x, axis):
+def channels(bank, x, axis, full_scale):
     """A list of samples for each channel, in double precision, and the rate of the bank's output."""
     if _are_files(x):
         x = read(x, bank=bank)
@@ -198,14 +198,7 @@ def channels(bank, x, axis):
         rows = [np.asarray(row, float) for row in x]
         frames = min(len(row) // samples for row, samples in zip(rows, bank.samples))
         x = np.concatenate([row[: frames * s].reshape(frames, s) for row, s in zip(rows, bank.samples)], axis=1).T
-    x = np.asarray(x)
-    x = x.astype(float) / -np.iinfo(x.dtype).min if x.dtype.kind == "i" else x
-    if x.dtype.kind == "c":
-        raise HybankError("complex samples; give the real or the imaginary parts for a page")
-    rows = x.T if axis in (0, -2) else x
-    if rows.ndim != 2 or len(rows) != sum(bank.samples):
-        raise HybankError(f"captures of the shape {x.shape} are not those of {sum(bank.samples)} channels")
-    return [[float(value) for value in row] for row in rows], rate
+    return _hybank.numbers(x, bank, axis, full_scale), rate
 
 
 def record(y, rate):

@@ -1,10 +1,11 @@
 //! Arrays as inputs of a bank, without a copy.
 
-use crate::errors::{capture_error, refused};
+use crate::errors::{capture_error, refused, warn};
 use crate::formats::Format;
 use hybank::bank::FrameLayout;
 use hybank::captures::Captures;
-use hybank::runtime::{PcmFrames, SampleLayout};
+use hybank::io::{DecodedFrames, Decoder, StatedScale, StreamHeader};
+use hybank::runtime::{Input, PcmFrames, SampleLayout, SideBySide};
 use numpy::ndarray::Axis;
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
@@ -20,6 +21,8 @@ pub(crate) struct Shape {
     pub(crate) axis: isize,
     /// N.
     pub(crate) channels: usize,
+    /// What is stated of their full scale.
+    pub(crate) scale: StatedScale,
 }
 
 /// How samples lie in memory.
@@ -44,12 +47,40 @@ pub(crate) struct Held<'py> {
     /// Along the axis that varies fastest.
     bytes: PyReadonlyArrayDyn<'py, u8>,
     layout: Layout,
+    scale: StatedScale,
     pub(crate) format: Format,
+}
+
+/// Samples as they lie in an array, or as numbers where their full scale is another.
+pub(crate) enum Samples<'a> {
+    Stored(Vec<PcmFrames<'a>>, Format),
+    Decoded(Vec<DecodedFrames>),
+}
+
+impl Samples<'_> {
+    /// The samples, or the real and the imaginary parts of complex ones.
+    pub(crate) fn parts(&self) -> Vec<Box<dyn Input + '_>> {
+        match self {
+            Self::Stored(frames, Format { complex: false, .. }) => {
+                vec![Box::new(SideBySide::new(&frames[..]))]
+            }
+            Self::Stored(frames, _) => {
+                let part = |part| frames.iter().map(|frames| frames.part(part)).collect::<Vec<_>>();
+                vec![Box::new(SideBySide::new(part(0))), Box::new(SideBySide::new(part(1)))]
+            }
+            Self::Decoded(all) => {
+                let real = all.iter().map(|one| one.frames().real).collect::<Vec<_>>();
+                let imaginary: Vec<_> = all.iter().filter_map(|one| one.frames().imaginary).collect();
+                let parts = [real, imaginary].into_iter().filter(|part| !part.is_empty());
+                parts.map(|part| Box::new(SideBySide::new(part)) as Box<dyn Input>).collect()
+            }
+        }
+    }
 }
 
 impl<'py> Held<'py> {
     /// Holds `x`: any array whose samples lie frame after frame or channel after channel is read where it
-    /// is, also a slice along time of the latter. Others (slices with steps, foreign byte orders, float16,
+    /// is, also a slice along time of the latter. Others (slices with steps, foreign byte orders,
     /// lists) are copied first.
     pub(crate) fn new(x: &Bound<'py, PyAny>, shape: Shape) -> PyResult<Self> {
         let Ok(array) = x.cast_exact::<PyUntypedArray>() else {
@@ -74,22 +105,24 @@ impl<'py> Held<'py> {
         let rows = if is_turned { x.getattr("T")? } else { x.clone() };
         let bytes = rows.call_method1("view", ("u1",))?;
         let bytes = bytes.cast::<PyArrayDyn<u8>>()?.try_readonly().map_err(refused)?;
-        Ok(Self { bytes, layout: Layout { channels, frames, order }, format })
+        Ok(Self { bytes, layout: Layout { channels, frames, order }, scale: shape.scale, format })
     }
 
-    /// From another byte order, or from floats of half precision.
+    /// From another byte order.
     fn converted(array: &Bound<'py, PyUntypedArray>, shape: Shape) -> PyResult<Self> {
         let dtype = array.getattr("dtype")?;
         if !dtype.getattr("isnative")?.extract::<bool>()? {
             let native = dtype.call_method1("newbyteorder", ("=",))?;
             return Self::new(&array.call_method1("astype", (native,))?, shape);
         }
-        if dtype.getattr("char")?.eq("e")? {
-            return Self::new(&array.call_method1("astype", ("f4",))?, shape);
+        if dtype.getattr("kind")?.eq("b")? {
+            return Err(refused(
+                "samples of bool are true or false, no numbers; convert what they mean to floats",
+            ));
         }
         Err(refused(format!(
-            "samples of {dtype} cannot be read; convert them to float32, float64, int16, int32, int8, uint8, complex64 or \
-             complex128"
+            "samples of {dtype} cannot be read; convert them to floats (f2, f4, f8), integers (i1 to i8, u1 to u4) or \
+             complex numbers (c8, c16)"
         )))
     }
 
@@ -102,22 +135,37 @@ impl<'py> Held<'py> {
         self.layout.frames
     }
 
-    /// The samples, or the real and the imaginary parts of complex ones.
-    pub(crate) fn parts(&self) -> PyResult<Vec<Vec<PcmFrames<'_>>>> {
-        (0..1 + usize::from(self.format.complex)).map(|part| self.part(part)).collect()
+    /// What reads the samples, of each recording, as numbers.
+    pub(crate) fn decoders(&self) -> PyResult<Vec<Decoder>> {
+        let decoder = |frames: &PcmFrames<'_>| Decoder::new(frames, self.format.complex, self.scale);
+        self.recordings()?.iter().map(decoder).collect::<Result<_, _>>().map_err(refused)
     }
 
-    /// The samples, or one part of complex ones.
-    fn part(&self, part: usize) -> PyResult<Vec<PcmFrames<'_>>> {
-        let recordings = self.recordings()?;
-        Ok(match self.format.complex {
-            true => recordings.iter().map(|frames| frames.part(part)).collect(),
-            false => recordings,
-        })
+    /// The samples of full scale 1. What is odd about them the decoders know.
+    pub(crate) fn samples(&self, decoders: &mut [Decoder]) -> PyResult<Samples<'_>> {
+        let stored = self.recordings()?;
+        let layout = SampleLayout::packed(self.format.number);
+        let mut each = decoders.iter_mut().zip(&stored);
+        if self.scale.changes(&StreamHeader::real(layout, 1)) {
+            let decoded = each.map(|(decoder, stored)| decoder.decode(stored)).collect::<Result<_, _>>();
+            return Ok(Samples::Decoded(decoded.map_err(refused)?));
+        }
+        each.try_for_each(|(decoder, stored)| decoder.judge(stored)).map_err(refused)?;
+        Ok(Samples::Stored(stored, self.format))
+    }
+
+    /// The first samples as numbers, at most so many frames.
+    pub(crate) fn first(&self, most: usize) -> PyResult<Vec<DecodedFrames>> {
+        let stored = self.recordings()?;
+        let mut decoders = self.decoders()?;
+        let each = decoders.iter_mut().zip(&stored);
+        let decode =
+            |(decoder, frames): (&mut Decoder, &PcmFrames<'_>)| decoder.decode(&frames.range(0..most));
+        each.map(decode).collect::<Result<_, _>>().map_err(refused)
     }
 
     /// The samples as a recorder has them; the parts of complex ones take turns.
-    pub(crate) fn recordings(&self) -> PyResult<Vec<PcmFrames<'_>>> {
+    fn recordings(&self) -> PyResult<Vec<PcmFrames<'_>>> {
         let Self { layout: Layout { channels, order, .. }, format: Format { number, complex }, .. } = *self;
         let layout = SampleLayout::packed(number);
         let parts = 1 + usize::from(complex);
@@ -134,11 +182,35 @@ impl<'py> Held<'py> {
 
     /// The samples as numbers, each channel by itself.
     pub(crate) fn captures(&self) -> PyResult<Captures> {
-        Captures::of_frames(&self.recordings()?, self.format.complex).map_err(capture_error)
+        let mut decoders = self.decoders()?;
+        let decode = |(decoder, frames): (&mut Decoder, &PcmFrames<'_>)| decoder.decode(frames);
+        let decoded = decoders.iter_mut().zip(&self.recordings()?).map(decode).collect::<Result<Vec<_>, _>>();
+        let decoded = decoded.map_err(refused)?;
+        warn_of(self.py(), &decoders)?;
+        Captures::of_frames(&decoded).map_err(capture_error)
     }
 }
 
+/// Warns of what is odd about samples.
+pub(crate) fn warn_of(py: Python<'_>, decoders: &[Decoder]) -> PyResult<()> {
+    let mut faults =
+        decoders.iter().enumerate().flat_map(|(k, decoder)| decoder.faults().map(move |fault| (k, fault)));
+    faults.try_for_each(|(k, fault)| match decoders.len() {
+        1 => warn(py, &format!("the samples: {fault}")),
+        _ => warn(py, &format!("channel {}: {fault}", k + 1)),
+    })
+}
+
 impl Shape {
+    /// Of one channel, nothing of whose full scale is stated.
+    pub(crate) const MONO: Self =
+        Self { axis: -1, channels: 1, scale: StatedScale { given: None, of_spec: None, bits: None } };
+
+    /// The same with what is stated of the full scale.
+    pub(crate) fn scaled(self, scale: StatedScale) -> Self {
+        Self { scale, ..self }
+    }
+
     fn time_first(self) -> bool {
         matches!(self.axis, 0 | -2)
     }
@@ -194,7 +266,7 @@ pub(crate) fn framed<'py>(
     axis: isize,
     is_whole: bool,
 ) -> PyResult<(Bound<'py, PyAny>, Shape)> {
-    let shape = Shape { axis, channels: layout.count() };
+    let shape = Shape { axis, channels: layout.count(), ..Shape::MONO };
     let converters = layout.samples();
     let given: Vec<Bound<'py, PyAny>> = match (x.cast::<PyList>(), x.cast::<PyTuple>()) {
         _ if layout.is_plain() => return Ok((x.clone(), shape)),
@@ -234,7 +306,7 @@ pub(crate) fn framed<'py>(
         rows.push(part.call_method1("reshape", (frames, *samples))?);
     }
     let all = numpy.call_method1("concatenate", (PyList::new(x.py(), rows)?, 1))?;
-    Ok((samples_of(&given[0], all)?, Shape { axis: 0, ..shape }))
+    Ok((all, Shape { axis: 0, ..shape }))
 }
 
 /// The array of a list, of an object of another package, or of a subclass.
@@ -245,16 +317,7 @@ fn plain<'py>(x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
             "samples are masked; x.filled(np.nan) marks them as missing, x.data takes them as they are",
         ));
     }
-    samples_of(x, numpy.call_method1("asarray", (x,))?)
-}
-
-/// The `array` that NumPy makes of `x`; integers of a list are no samples of a converter.
-fn samples_of<'py>(x: &Bound<'py, PyAny>, array: Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-    let is_list = x.is_instance_of::<PyList>() || x.is_instance_of::<PyTuple>();
-    match is_list && array.getattr("dtype")?.getattr("kind")?.eq("i")? {
-        true => array.call_method1("astype", ("f8",)),
-        false => Ok(array),
-    }
+    numpy.call_method1("asarray", (x,))
 }
 
 /// Rows of `columns` numbers as a read-only array; a matrix without rows keeps its columns.

@@ -3,6 +3,7 @@
 use crate::arrays::{framed, matrix, read_only};
 use crate::background;
 use crate::errors::{choose, refused};
+use crate::formats;
 use crate::fuse::{self, Request, parse_algorithm};
 use crate::hardware::{self, CircuitKeywords};
 use crate::outputs::write_file;
@@ -12,6 +13,7 @@ use crate::results::{FiguresReport, of_report, record};
 use crate::sources;
 use crate::stream::Stream;
 use hybank::bank::{self, SynthesisFilters};
+use hybank::captures::Converters;
 use hybank::design;
 use hybank::interchange::{Format as Exported, export};
 use numpy::{Complex64, PyArray1, PyArray2};
@@ -241,8 +243,8 @@ impl Bank {
 
     #[doc = include_str!("docs/Bank.report.rst")]
     #[pyo3(
-        signature = (path, captures = None, *, axis = -1, overwrite = true),
-        text_signature = "($self, path, captures=None, *, axis=-1, overwrite=True)"
+        signature = (path, captures = None, *, axis = -1, overwrite = true, full_scale = None),
+        text_signature = "($self, path, captures=None, *, axis=-1, overwrite=True, full_scale=None)"
     )]
     fn report(
         slf: &Bound<'_, Self>,
@@ -250,8 +252,9 @@ impl Bank {
         captures: Option<&Bound<'_, PyAny>>,
         axis: isize,
         overwrite: bool,
+        full_scale: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let page = pictures::page(slf, captures, axis, &path)?;
+        let page = pictures::page(slf, captures, axis, full_scale, &path)?;
         write_file(&path, page.as_bytes(), overwrite)
     }
 
@@ -259,9 +262,9 @@ impl Bank {
     #[pyo3(
         signature = (
             x, *, axis = -1, dtype = None, threads = 1, gaps = false, algorithm = "auto", keep_latency = false,
-            interleaved = None, rate = None, full_output = false
+            interleaved = None, rate = None, full_output = false, full_scale = None
         ),
-        text_signature = "($self, x, *, axis=-1, dtype=None, threads=1, gaps=False, algorithm='auto', keep_latency=False, interleaved=None, rate=None, full_output=False)"
+        text_signature = "($self, x, *, axis=-1, dtype=None, threads=1, gaps=False, algorithm='auto', keep_latency=False, interleaved=None, rate=None, full_output=False, full_scale=None)"
     )]
     #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
     fn fuse<'py>(
@@ -276,6 +279,7 @@ impl Bank {
         interleaved: Option<usize>,
         rate: Option<f64>,
         full_output: bool,
+        full_scale: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let py = x.py();
         if interleaved.is_some() || sources::is_foreign(x)? {
@@ -288,10 +292,12 @@ impl Bank {
             keywords.set_item("keep_latency", keep_latency)?;
             keywords.set_item("rate", rate)?;
             keywords.set_item("full_output", full_output)?;
+            keywords.set_item("full_scale", full_scale)?;
             return py.import("hybank._inputs")?.call_method("fuse", (slf, x, interleaved), Some(&keywords));
         }
         let bank = &slf.get().bank;
         let (frames, shape) = framed(x, &bank.layout(), axis, false)?;
+        let shape = shape.scaled(Converters::from(&**bank).scale(formats::full_scale(full_scale)?));
         let request = Request {
             workers: fuse::workers(threads)?,
             gaps: fuse::gaps(py, bank, gaps)?,
@@ -326,8 +332,8 @@ impl Bank {
 
     #[doc = include_str!("docs/Bank.stream.rst")]
     #[pyo3(
-        signature = (*, axis = -1, dtype = None, algorithm = "auto", state = None, gaps = false),
-        text_signature = "($self, *, axis=-1, dtype=None, algorithm='auto', state=None, gaps=False)"
+        signature = (*, axis = -1, dtype = None, algorithm = "auto", state = None, gaps = false, full_scale = None),
+        text_signature = "($self, *, axis=-1, dtype=None, algorithm='auto', state=None, gaps=False, full_scale=None)"
     )]
     fn stream(
         slf: &Bound<'_, Self>,
@@ -336,9 +342,12 @@ impl Bank {
         algorithm: &str,
         state: Option<&[u8]>,
         gaps: bool,
+        full_scale: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Stream> {
         let bank = &slf.get().bank;
-        Stream::new(bank, axis, dtype.as_ref(), algorithm, fuse::gaps(slf.py(), bank, gaps)?)?.resumed(state)
+        Stream::new(bank, axis, dtype.as_ref(), algorithm, fuse::gaps(slf.py(), bank, gaps)?)?
+            .scaled(formats::full_scale(full_scale)?)
+            .resumed(state)
     }
 
     fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {

@@ -3,6 +3,7 @@
 use crate::arrays::{Held, framed};
 use crate::background;
 use crate::errors::{refused, warn};
+use crate::formats;
 use crate::results::{Made, record};
 use crate::sources;
 use crate::values::frequencies;
@@ -10,6 +11,7 @@ use hybank::calibrate::{
     self as calibration, Calibration, CalibrationSignal, ChannelEstimate, Fit, Fitting, Settings, Tone,
     Warning, applied,
 };
+use hybank::captures::Converters;
 use hybank::sine_fit::Estimate;
 use hybank::spec::Spec;
 use hybank::units::{FastPeriods, Hertz};
@@ -30,12 +32,14 @@ pub(crate) fn calibrate<'py>(
     reference: Option<usize>,
     clip: Option<f64>,
     axis: isize,
+    full_scale: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = x.py();
     let spec = sources::spec(spec)?;
     let layout = spec.layout();
     let (frames, shape) = framed(x, &layout, axis, false)?;
-    let held = Held::new(&frames, shape)?;
+    let scale = Converters::from(&spec).scale(formats::full_scale(full_scale)?);
+    let held = Held::new(&frames, shape.scaled(scale))?;
     let tones = tones.map(|_| frequencies("tones", tones)).transpose()?;
     let signal = signal(&spec, tones, waveform, rate, blind)?;
     if clip.is_some_and(|level| level.is_nan() || level <= 0.0) {

@@ -1,12 +1,13 @@
 //! Recordings from files, as `fuse` and `measure` of the command line read them.
 
+use crate::arrays::{Held, Shape};
 use crate::bank::Bank;
 use crate::errors::{capture_error, io_error, refused, warn};
+use crate::formats;
 use crate::sources;
 use hybank::captures::{CaptureError, Captures, ChannelSamples, Converters, FileFormat};
 use hybank::io::{LostSamples, MAX_LOST, MultiReader, ReadOptions, TimeInterleaving, Until};
 use hybank::pipeline::matching;
-use hybank::quantity::{self, FullScale};
 use numpy::{Complex64, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -18,11 +19,11 @@ const MOST: usize = 1 << 32;
 /// How files are read, by the names of the command line.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub(crate) struct Options {
+pub(crate) struct Options<'py> {
     format: String,
     channels: Option<usize>,
     channel: Option<usize>,
-    full_scale: Option<String>,
+    full_scale: Option<Bound<'py, PyAny>>,
     interleaved: Option<usize>,
     lost: Option<PathBuf>,
     max_lost: Option<u64>,
@@ -50,7 +51,7 @@ fn in_turn(of: &Converters<'_>, converters: usize) -> PyResult<TimeInterleaving>
 pub(crate) fn read<'py>(
     py: Python<'py>,
     files: Vec<PathBuf>,
-    options: Options,
+    options: Options<'py>,
     source: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     match source {
@@ -101,20 +102,15 @@ fn read_for<'py>(
     Ok(found)
 }
 
-impl Options {
+impl Options<'_> {
     fn format(&self) -> PyResult<FileFormat> {
         Ok(FileFormat {
             coding: self.format.parse().map_err(|error| refused(format!("format: {error}")))?,
             channels: self.channels,
             only: self.channel.map(|channel| channel.saturating_sub(1)),
-            full_scale: full_scale(self.full_scale.as_deref())?,
+            full_scale: formats::full_scale(self.full_scale.as_ref())?,
         })
     }
-}
-
-fn full_scale(given: Option<&str>) -> PyResult<Option<FullScale>> {
-    let scale = given.map(quantity::full_scale).transpose();
-    scale.map_err(|error| refused(format!("full_scale: {error}")))
 }
 
 /// Of complex samples both parts are one.
@@ -131,6 +127,23 @@ fn array(py: Python<'_>, channel: ChannelSamples) -> Bound<'_, PyAny> {
 #[pyfunction]
 pub(crate) fn turns(source: &Bound<'_, PyAny>, interleaved: usize) -> PyResult<Vec<usize>> {
     with_converters(source, |converters| Ok(in_turn(converters, interleaved)?.channels().to_vec()))
+}
+
+/// The samples of each channel of an array as numbers of full scale 1.
+#[pyfunction]
+pub(crate) fn numbers<'py>(
+    x: &Bound<'py, PyAny>,
+    source: &Bound<'py, PyAny>,
+    axis: isize,
+    full_scale: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Vec<Vec<f64>>> {
+    let given = formats::full_scale(full_scale)?;
+    let (scale, channels) = with_converters(source, |all| Ok((all.scale(given), all.layout().count())))?;
+    let captures = Held::new(x, Shape { axis, channels, scale })?.captures()?;
+    if captures.channels.iter().any(|channel| channel.imaginary.is_some()) {
+        return Err(refused("complex samples; give the real or the imaginary parts for a page"));
+    }
+    Ok(captures.channels.into_iter().map(|channel| channel.samples).collect())
 }
 
 /// The samples of a frame of a bank or a spec.

@@ -1,6 +1,7 @@
 //! The number types of samples in arrays.
 
 use crate::errors::refused;
+use hybank::quantity::{self, FullScale};
 use hybank::runtime::{PcmFormat, Precision};
 use numpy::{PyArrayDescr, PyArrayDescrMethods};
 use pyo3::prelude::*;
@@ -13,16 +14,27 @@ pub(crate) struct Format {
 }
 
 /// The formats by the names that NumPy has for them.
-const FORMATS: [(&str, Format); 8] = [
+const FORMATS: [(&str, Format); 12] = [
     ("f4", Format::F32),
     ("f8", Format::native(PcmFormat::F64Le, false)),
     ("i1", Format::native(PcmFormat::S8, false)),
     ("u1", Format::native(PcmFormat::U8, false)),
     ("i2", Format::native(PcmFormat::S16Le, false)),
     ("i4", Format::native(PcmFormat::S32Le, false)),
+    ("i8", Format::native(PcmFormat::S64Le, false)),
+    ("u2", Format::native(PcmFormat::U16Le, false)),
+    ("u4", Format::native(PcmFormat::U32Le, false)),
+    ("f2", Format::native(PcmFormat::F16Le, false)),
     ("c8", Format::native(PcmFormat::F32Le, true)),
     ("c16", Format::native(PcmFormat::F64Le, true)),
 ];
+
+/// The full scale of converters that `full_scale=` means: a number, or codes such as "12bits".
+pub(crate) fn full_scale(given: Option<&Bound<'_, PyAny>>) -> PyResult<Option<FullScale>> {
+    let Some(given) = given else { return Ok(None) };
+    let scale = quantity::full_scale(&given.str()?.to_cow()?);
+    scale.map(Some).map_err(|error| refused(format!("full_scale: {error}")))
+}
 
 impl Format {
     /// Real samples in f32.
@@ -74,7 +86,7 @@ impl Format {
         let known = known.filter(|_| descr.is_native_byteorder() != Some(false));
         known.map(|(_, format)| *format).ok_or_else(|| {
             refused(format!(
-                "dtype {descr} is not one of f4 f8 i1 u1 i2 i4 c8 c16 in the byte order of this machine; choose one"
+                "dtype {descr} is not one of f2 f4 f8 i1 i2 i4 i8 u1 u2 u4 c8 c16 in the byte order of this machine; choose one"
             ))
         })
     }

@@ -1,6 +1,6 @@
 //! Fuses arrays.
 
-use crate::arrays::{Held, Shape};
+use crate::arrays::{Held, Shape, warn_of};
 use crate::background::{self, Signals};
 use crate::errors::{capture_error, refused, warn};
 use crate::formats::Format;
@@ -9,10 +9,10 @@ use crate::results::Made;
 use hybank::bank::Bank;
 use hybank::calibrate::{Agreement, Record, Verdict, agreement, comparable, frames_for_agreement};
 use hybank::design::MissingSamples;
-use hybank::io::OfflineSamples;
+use hybank::io::{DecodedFrames, OfflineSamples};
 use hybank::pipeline::{self, DroppedLatency, Gap, GapEstimator, GapSummary, Outcome, Settings, Warning};
-use hybank::runtime::{Algorithm, Frames, Input, Options, PcmFormat, Plan, Precision, ThreadPool};
-use numpy::{PyArray1, PyArrayMethods};
+use hybank::runtime::{Algorithm, Frames, Input, Options, Plan, Precision, ThreadPool};
+use numpy::PyArray1;
 use pyo3::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
@@ -76,7 +76,9 @@ fn judged(bank: &Bank, held: &Held<'_>) -> PyResult<Agreement> {
         Err(verdict) => return Ok(verdict.into()),
     };
     let most = frames_for_agreement(spec.channels.len());
-    let samples = OfflineSamples::of_frames(&held.recordings()?, most);
+    let first = held.first(most)?;
+    let frames: Vec<_> = first.iter().map(DecodedFrames::frames).collect();
+    let samples = OfflineSamples::of_frames(&frames, most);
     let channels = samples.map_err(|error| capture_error(error.into()))?.channels;
     let records: Vec<Record> = channels.into_iter().map(Record::new).collect();
     background::run(held.py(), None, move |_| agreement(&spec, &records))
@@ -90,8 +92,7 @@ pub(crate) struct Fused<'py> {
     frames: usize,
     latency_dropped: usize,
     seconds: f64,
-    /// The number type of the outputs.
-    number: PcmFormat,
+    peak: f64,
 }
 
 /// The output samples of an array.
@@ -121,9 +122,11 @@ fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Reques
     let plan = plan(bank, format, algorithm)?;
     let latency_dropped = settings.dropped.samples(&plan);
     let mut array = NewArray::new(py, frames * bank.ratio, format)?;
-    let (parts, mut room) = (held.parts()?, array.room()?);
-    let parts: Vec<_> = parts.iter().map(Vec::as_slice).collect();
-    let parts: Vec<_> = parts.iter().map(|part| Frames::new(part, 0..frames)).collect();
+    let mut decoders = held.decoders()?;
+    let samples = held.samples(&mut decoders)?;
+    warn_of(py, &decoders)?;
+    let (parts, mut room) = (samples.parts(), array.room()?);
+    let parts: Vec<_> = parts.iter().map(|part| Frames::new(&**part, 0..frames)).collect();
     let parts: Vec<&dyn Input> = parts.iter().map(|part| part as _).collect();
     let signals = Signals::new();
     let stop = || signals.raised();
@@ -132,12 +135,12 @@ fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Reques
     Ok(Fused {
         // A frame may hold several samples of a converter.
         outcome: Outcome { clipped: room.clipped, channels: bank.channel_count(), ..outcome },
+        peak: room.peak(frames * bank.ratio * parts.len()),
         y: array.finish()?,
         captures: Verdict::Unjudged.into(),
         frames,
         latency_dropped,
         seconds: 0.0,
-        number: format.number,
     })
 }
 
@@ -153,16 +156,14 @@ impl Fused<'_> {
 
     /// The report of a run with so many output samples per second, as that of the command line.
     pub(crate) fn report<'py>(&self, py: Python<'py>, rate: f64) -> PyResult<Bound<'py, PyAny>> {
-        let Self { y, outcome, captures, frames, latency_dropped, seconds, number } = self;
-        let bytes = y.call_method1("view", ("u1",))?;
-        let bytes = bytes.cast::<PyArray1<u8>>()?.try_readonly().map_err(refused)?;
+        let Self { outcome, captures, frames, latency_dropped, seconds, peak, .. } = self;
         let list = |gaps: &GapSummary| -> Vec<_> { gaps.list.iter().map(gap).collect() };
         Made::of(py, "FuseReport", outcome)?
             .with("frames", *frames)?
             .with("rate", rate)?
             .with("captures", captures.summary())?
             .with("latency_dropped", *latency_dropped)?
-            .with("peak", number.peak(bytes.as_slice().map_err(refused)?))?
+            .with("peak", *peak)?
             .with("seconds", *seconds)?
             .with("warnings", self.warnings())?
             .with("missing", outcome.gaps.as_ref().map(|gaps| gaps.missing))?

@@ -58,6 +58,7 @@ fn _hybank(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(measure::compare, module)?)?;
     module.add_function(wrap_pyfunction!(files::read, module)?)?;
     module.add_function(wrap_pyfunction!(files::turns, module)?)?;
+    module.add_function(wrap_pyfunction!(files::numbers, module)?)?;
     module.add_function(wrap_pyfunction!(files::frame_samples, module)?)?;
     module.add_function(wrap_pyfunction!(outputs::encode, module)?)?;
     module.add_function(wrap_pyfunction!(ibr::render_rectified, module)?)?;

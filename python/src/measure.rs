@@ -3,9 +3,11 @@
 use crate::arrays::{Held, Shape};
 use crate::background;
 use crate::errors::{choose, refused, warn};
+use crate::formats;
 use crate::results::{Made, record};
 use crate::values::frequencies;
 use hybank::captures::ChannelSamples;
+use hybank::io::StatedScale;
 use hybank::measure::{self as quality, Measurement, Settings, Warning, Window};
 use hybank::overview::{Figure, causes, column};
 use hybank::units::{Decibels, Hertz};
@@ -18,19 +20,21 @@ struct Request {
     window: Window,
     /// Samples at either end that are not measured.
     skip: usize,
+    scale: StatedScale,
 }
 
 impl Request {
-    fn new(rate: f64, window: &str, skip: usize) -> PyResult<Self> {
+    fn new(rate: f64, window: &str, skip: usize, full_scale: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         if !(rate > 0.0 && rate.is_finite()) {
             return Err(refused(format!("rate: {rate} is no sample rate; give samples per second")));
         }
-        Ok(Self { rate: Hertz(rate), window: choose("window", window, &WINDOWS)?, skip })
+        let scale = StatedScale { given: formats::full_scale(full_scale)?, ..StatedScale::default() };
+        Ok(Self { rate: Hertz(rate), window: choose("window", window, &WINDOWS)?, skip, scale })
     }
 
     /// The only channel of an array, without its ends.
     fn channel(&self, y: &Bound<'_, PyAny>) -> PyResult<ChannelSamples> {
-        let captures = Held::new(y, Shape { axis: -1, channels: 1 })?.captures()?;
+        let captures = Held::new(y, Shape::MONO.scaled(self.scale))?.captures()?;
         let channel = captures.channels.into_iter().next().unwrap_or_default();
         channel.trimmed(self.skip).map_err(|error| refused(format!("skip: {error}")))
     }
@@ -45,16 +49,15 @@ pub(crate) fn measure(
     tones: Option<&Bound<'_, PyAny>>,
     interleaved: usize,
     harmonics: usize,
-    full_scale: f64,
+    full_scale: Option<&Bound<'_, PyAny>>,
     window: &str,
     skip: usize,
 ) -> PyResult<Py<PyAny>> {
-    let request = Request::new(rate, window, skip)?;
+    let request = Request::new(rate, window, skip, full_scale)?;
     let settings = Settings {
         tones: frequencies("tones", tones)?.into_iter().map(Hertz).collect(),
         converters: interleaved,
         harmonics,
-        full_scale,
         window: request.window,
         ..Settings::default()
     };
@@ -65,15 +68,16 @@ pub(crate) fn measure(
 
 /// A record against a reference, and the spectrum of their difference: hertz and amplitudes.
 #[pyfunction]
-#[pyo3(signature = (y, reference, rate, window, skip))]
+#[pyo3(signature = (y, reference, rate, window, skip, full_scale))]
 pub(crate) fn compare(
     y: &Bound<'_, PyAny>,
     reference: &Bound<'_, PyAny>,
     rate: f64,
     window: &str,
     skip: usize,
+    full_scale: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(Py<PyAny>, Spectrum)> {
-    let (py, request) = (y.py(), Request::new(rate, window, skip)?);
+    let (py, request) = (y.py(), Request::new(rate, window, skip, full_scale)?);
     let part = |x: &Bound<'_, PyAny>| -> PyResult<Vec<f64>> {
         let channel = request.channel(x)?;
         if channel.imaginary.is_some() {

@@ -56,15 +56,16 @@ pub(crate) fn encode<'py>(
     y: &Bound<'py, PyAny>,
     dtype: &Bound<'py, PyAny>,
 ) -> PyResult<(Bound<'py, PyAny>, u64)> {
-    let held = Held::new(y, Shape { axis: -1, channels: 1 })?;
+    let held = Held::new(y, Shape::MONO)?;
     let mut array = NewArray::new(y.py(), held.frames(), Format::of_dtype(dtype)?)?;
-    let (parts, mut room) = (held.parts()?, array.room()?);
+    let samples = held.samples(&mut held.decoders()?)?;
+    let (parts, mut room) = (samples.parts(), array.room()?);
     let (frames, is_single) = (held.frames(), held.format == Format::F32);
     let clipped = y.py().detach(|| {
         if is_single {
-            convert::<f32>(&parts[0].as_slice(), frames, &mut room);
+            convert::<f32>(&*parts[0], frames, &mut room);
         } else {
-            convert::<f64>(&parts[0].as_slice(), frames, &mut room);
+            convert::<f64>(&*parts[0], frames, &mut room);
         }
         room.clipped
     });

@@ -45,11 +45,12 @@ pub(crate) fn page(
     bank: &Bound<'_, Bank>,
     captures: Option<&Bound<'_, PyAny>>,
     axis: isize,
+    full_scale: Option<&Bound<'_, PyAny>>,
     path: &Path,
 ) -> PyResult<String> {
     let py = bank.py();
     let given = captures.map(|captures| -> PyResult<(Vec<Vec<f64>>, f64)> {
-        py.import("hybank._inputs")?.call_method1("channels", (bank, captures, axis))?.extract()
+        py.import("hybank._inputs")?.call_method1("channels", (bank, captures, axis, full_scale))?.extract()
     });
     let given = given.transpose()?;
     let (bank, mut is_cut) = (Arc::clone(&bank.get().bank), false);

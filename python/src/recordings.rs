@@ -3,7 +3,7 @@
 use crate::errors::{io_error, no_others};
 use crate::formats::Format;
 use hybank::io::FrameFile;
-use hybank::runtime::{Input, Isa, PcmFrames, Precision, Sample};
+use hybank::runtime::{Precision, Sample};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -55,10 +55,9 @@ impl Recording {
 
     #[doc = include_str!("docs/Recording.read.rst")]
     fn read<'py>(&self, py: Python<'py>, first: u64, count: usize) -> PyResult<Bound<'py, PyAny>> {
-        let bytes = py.detach(|| self.file.read(first, count)).map_err(io_error)?;
         match Precision::of(self.file.header().layout.format) {
-            Precision::Single => self.array::<f32>(py, &bytes),
-            Precision::Double => self.array::<f64>(py, &bytes),
+            Precision::Single => self.array::<f32>(py, first, count),
+            Precision::Double => self.array::<f64>(py, first, count),
         }
     }
 
@@ -76,14 +75,13 @@ impl Recording {
     fn array<'py, T: Sample + numpy::Element>(
         &self,
         py: Python<'py>,
-        bytes: &[u8],
+        first: u64,
+        count: usize,
     ) -> PyResult<Bound<'py, PyAny>> {
         let header = self.file.header();
         let columns = header.columns();
-        let frames = [PcmFrames { layout: header.layout, channels: columns, bytes }];
-        let count = frames[0].frames();
-        let mut numbers = vec![T::default(); count * columns];
-        py.detach(|| (&frames.as_slice() as &dyn Input).load(Isa::detect(), 0, &mut numbers));
+        let numbers = py.detach(|| self.file.read::<T>(first, count)).map_err(io_error)?;
+        let count = numbers.len() / columns;
         let array: Bound<'py, PyArray2<T>> = PyArray1::from_vec(py, numbers).reshape([count, columns])?;
         if header.is_complex { array.call_method1("view", (self.dtype(),)) } else { Ok(array.into_any()) }
     }

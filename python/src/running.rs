@@ -5,7 +5,7 @@ use crate::formats::Format;
 use hybank::bank::Bank;
 use hybank::io::IoError;
 use hybank::pipeline::{Block, DroppedLatency, GapEstimator, Pipeline, Settings};
-use hybank::runtime::{PcmFrames, Plan};
+use hybank::runtime::{Input, Plan};
 use pyo3::prelude::*;
 use std::io::Write;
 use std::sync::Arc;
@@ -27,11 +27,12 @@ impl Running {
     }
 
     /// Filters frames into `room`, which has their size; returns how many samples came out.
-    pub(crate) fn push(&mut self, recordings: &[PcmFrames<'_>], mut room: &mut [u8]) -> PyResult<usize> {
+    pub(crate) fn push(&mut self, parts: &[Box<dyn Input + '_>], mut room: &mut [u8]) -> PyResult<usize> {
         self.begin()?;
         let Self { pipeline, mask, .. } = self;
         let before = pipeline.samples();
-        pipeline.push(recordings, &mut |block| keep(block, &mut room, mask)).map_err(refused)?;
+        let parts: Vec<&dyn Input> = parts.iter().map(|part| &**part).collect();
+        pipeline.push_parts(&parts, &mut |block| keep(block, &mut room, mask)).map_err(refused)?;
         Ok((pipeline.samples() - before) as usize)
     }
 

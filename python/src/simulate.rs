@@ -117,7 +117,7 @@ fn part(spec: &Spec, signal: &Bound<'_, PyAny>, rate: Option<f64>) -> PyResult<S
     if !(rate.0 > 0.0 && rate.0.is_finite()) {
         return Err(refused(format!("rate: {} is no sample rate; give samples per second", rate.0)));
     }
-    let held = Held::new(signal, Shape { axis: -1, channels: 1 })?;
+    let held = Held::new(signal, Shape::MONO)?;
     let channel = held.captures()?.channels.into_iter().next().unwrap_or_default();
     let ChannelSamples { samples, imaginary, .. } = channel.finite().map_err(refused)?;
     let part = |samples: &[f64]| Analog::Recorded(Recording::new(samples, FastPeriods(fast / rate)));

@@ -3,12 +3,15 @@
 use crate::arrays::{Held, Shape, framed};
 use crate::bank::Bank as PyBank;
 use crate::errors::{no_others, refused};
-use crate::formats::Format;
+use crate::formats::{Format, full_scale};
 use crate::fuse::{gap, marks, parse_algorithm, plan};
 use crate::outputs::NewArray;
 use crate::running::Running;
 use hybank::bank::Bank;
+use hybank::captures::Converters;
+use hybank::io::{Decoder, StatedScale};
 use hybank::pipeline::{GapEstimator, Pipeline};
+use hybank::quantity::FullScale;
 use hybank::runtime::Plan;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -28,11 +31,15 @@ pub(crate) struct Stream {
     format: Format,
     gaps: Option<Arc<dyn GapEstimator>>,
     running: Mutex<Running>,
+    /// What reads the samples; made by the first of them.
+    decoders: Mutex<Vec<Decoder>>,
 }
 
 /// How a pickle makes a stream: a function and its arguments.
-type Reduced<'py> =
-    (Bound<'py, PyAny>, (Bound<'py, PyBank>, isize, &'static str, String, Bound<'py, PyBytes>, bool));
+type Reduced<'py> = (
+    Bound<'py, PyAny>,
+    (Bound<'py, PyBank>, isize, &'static str, String, Bound<'py, PyBytes>, bool, Option<String>),
+);
 
 impl Stream {
     pub(crate) fn new(
@@ -43,12 +50,20 @@ impl Stream {
         gaps: Option<Arc<dyn GapEstimator>>,
     ) -> PyResult<Self> {
         let format = dtype.map_or(Ok(Format::F32), Format::of_dtype)?;
-        let shape = Shape { axis, channels: bank.frame_samples() };
+        let scale = Converters::from(bank.as_ref()).scale(None);
+        let shape = Shape { axis, channels: bank.frame_samples(), scale };
         shape.check()?;
         let asked = parse_algorithm(algorithm)?.without_added_latency();
         let plan = plan(bank, format, asked)?;
         let running = Mutex::new(Running::new(bank, &plan, format, gaps.clone()));
-        Ok(Self { bank: Arc::clone(bank), asked: algorithm.to_owned(), plan, shape, format, gaps, running })
+        let (bank, asked, decoders) = (Arc::clone(bank), algorithm.to_owned(), Mutex::default());
+        Ok(Self { bank, asked, plan, shape, format, gaps, running, decoders })
+    }
+
+    /// The same stream for samples of this full scale, if one is given.
+    pub(crate) fn scaled(self, given: Option<FullScale>) -> Self {
+        let scale = StatedScale { given, ..self.shape.scale };
+        Self { shape: self.shape.scaled(scale), ..self }
     }
 
     /// The same stream at the place of a state, if one is given.
@@ -63,6 +78,15 @@ impl Stream {
     /// To be called without the interpreter lock: the thread that holds the run may wait for that lock.
     fn lock(&self) -> MutexGuard<'_, Running> {
         self.running.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The decoders of arrays like this one.
+    fn decoders(&self, held: &Held<'_>) -> PyResult<MutexGuard<'_, Vec<Decoder>>> {
+        let mut decoders = self.decoders.lock().unwrap_or_else(PoisonError::into_inner);
+        if decoders.len() != held.decoders()?.len() {
+            *decoders = held.decoders()?;
+        }
+        Ok(decoders)
     }
 
     fn read<T: Send>(&self, py: Python<'_>, of: impl FnOnce(&Pipeline<'static>) -> T + Send) -> T {
@@ -81,11 +105,12 @@ impl Stream {
     ) -> PyResult<Bound<'py, PyAny>> {
         no_others("Stream.process", "x", unknown)?;
         let (frames, shape) = framed(x, &self.bank.layout(), self.shape.axis, true)?;
-        let held = Held::new(&frames, shape)?;
+        let held = Held::new(&frames, shape.scaled(self.shape.scale))?;
         self.check_parts(held.format)?;
         let mut array = NewArray::new(x.py(), held.frames() * self.plan.ratio(), self.format)?;
-        let (recordings, room) = (held.recordings()?, array.bytes()?);
-        let samples = x.py().detach(|| self.lock().push(&recordings, room))?;
+        let samples = held.samples(&mut *self.decoders(&held)?)?;
+        let (parts, room) = (samples.parts(), array.bytes()?);
+        let samples = x.py().detach(|| self.lock().push(&parts, room))?;
         array.finish_first(samples)
     }
 
@@ -207,7 +232,8 @@ impl Stream {
         let state = own.state(py)?;
         let closed = py.detach(|| own.lock().is_closed);
         let bank = PyBank { bank: Arc::clone(&own.bank) }.into_pyobject(py)?;
-        let arguments = (bank, own.shape.axis, own.format.name(), own.asked.clone(), state, closed);
+        let scale = own.shape.scale.given.map(|scale| scale.to_string());
+        let arguments = (bank, own.shape.axis, own.format.name(), own.asked.clone(), state, closed, scale);
         Ok((slf.get_type().getattr("_of")?, arguments))
     }
 
@@ -220,8 +246,10 @@ impl Stream {
         algorithm: &str,
         state: &[u8],
         closed: bool,
+        scale: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let stream = Self::new(&bank.bank, axis, Some(dtype), algorithm, None)?.resumed(Some(state))?;
+        let stream = Self::new(&bank.bank, axis, Some(dtype), algorithm, None)?;
+        let stream = stream.scaled(full_scale(scale)?).resumed(Some(state))?;
         stream.lock().is_closed = closed;
         Ok(stream)
     }

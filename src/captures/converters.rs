@@ -1,7 +1,7 @@
 //! Of which converters captures come, and how their files are read.
 
 use crate::bank::{Bank, FrameLayout};
-use crate::io::{Coding, MultiReader, ReadOptions, TimeInterleaving};
+use crate::io::{Coding, MultiReader, ReadOptions, StatedScale, TimeInterleaving};
 use crate::pipeline::matching::{self, InputMismatch, NotInTurn};
 use crate::quantity::FullScale;
 use crate::spec::Spec;
@@ -16,7 +16,7 @@ pub struct FileFormat {
     pub channels: Option<usize>,
     /// The only channel to read of each file, from 0.
     pub only: Option<usize>,
-    /// Full scale of files whose format does not say it.
+    /// Full scale of the converters.
     pub full_scale: Option<FullScale>,
 }
 
@@ -26,7 +26,8 @@ impl FileFormat {
         let Self { coding, only, full_scale, .. } = self;
         let usual = if files == 1 && only.is_none() { channels } else { 1 };
         let channels = self.channels.unwrap_or(usual);
-        ReadOptions { coding, channels, only, full_scale, ..ReadOptions::files() }
+        let scale = StatedScale { given: full_scale, ..StatedScale::default() };
+        ReadOptions { coding, channels, only, scale, ..ReadOptions::files() }
     }
 }
 
@@ -84,6 +85,15 @@ impl Converters<'_> {
         matching::interleaving(converters, &self.delays(), &self.layout)
     }
 
+    /// What is stated of the full scale of the converters, by the user and by the spec.
+    pub fn scale(&self, given: Option<FullScale>) -> StatedScale {
+        let spec = self.spec();
+        // Converters of unequal bits are told apart by no file.
+        let bits = spec.and_then(|spec| spec.channels.first()?.bits);
+        let bits = bits.filter(|_| spec.is_some_and(|spec| spec.channels.iter().all(|one| one.bits == bits)));
+        StatedScale { given, of_spec: spec.and_then(|spec| spec.full_scale), bits }
+    }
+
     /// How so many files of these converters are read. The spec states a full scale if the files do not.
     pub fn options<'a>(
         &'a self,
@@ -93,8 +103,7 @@ impl Converters<'_> {
     ) -> ReadOptions<'a> {
         let own = format.options(files, matching::channels_of_raw(&self.layout, files));
         let samples_per_frame = matching::samples_per_frame(&self.layout, files);
-        let full_scale = own.full_scale.or(self.spec().and_then(|spec| spec.full_scale));
-        ReadOptions { interleaving, samples_per_frame, full_scale, ..own }
+        ReadOptions { interleaving, samples_per_frame, scale: self.scale(format.full_scale), ..own }
     }
 
     /// The files have the rates of the spec, or all channels and rates of the bank called `name`, whose

@@ -2,7 +2,8 @@
 
 use super::{CaptureError, ChannelSamples};
 use crate::calibrate::Record;
-use crate::io::{MultiReader, OfflineSamples, PcmFrames, StreamHeader};
+use crate::io::{DecodedFrames, MultiReader, OfflineSamples};
+use crate::runtime::Input;
 use crate::units::Hertz;
 
 /// Captures that were taken together.
@@ -35,17 +36,16 @@ impl Captures {
         Ok(Self { name, channels, rate: rate.map(Hertz), is_cut })
     }
 
-    /// From samples in memory; of complex ones each part is a channel of the frames.
+    /// From samples in memory.
     ///
     /// # Errors
     /// [`CaptureError::Samples`] if there is no memory for the numbers.
-    pub fn of_frames(frames: &[PcmFrames<'_>], is_complex: bool) -> Result<Self, CaptureError> {
-        let rails = frames.iter().flat_map(|part| {
-            let header = StreamHeader::real(part.layout, part.channels);
-            std::iter::repeat_n(header.rails, part.channels)
-        });
-        let rails = rails.step_by(if is_complex { 2 } else { 1 });
-        let channels = OfflineSamples::of_frames(frames, usize::MAX)?.channels;
+    pub fn of_frames(decoded: &[DecodedFrames]) -> Result<Self, CaptureError> {
+        let frames: Vec<_> = decoded.iter().map(DecodedFrames::frames).collect();
+        let rails = decoded.iter().zip(&frames);
+        let rails = rails.flat_map(|(one, frames)| std::iter::repeat_n(one.rails(), frames.real.channels()));
+        let is_complex = frames.iter().any(|frames| frames.imaginary.is_some());
+        let channels = OfflineSamples::of_frames(&frames, usize::MAX)?.channels;
         let channels = with_rails(channels, is_complex, rails);
         Ok(Self { name: "the captures".into(), channels, rate: None, is_cut: false })
     }
@@ -86,13 +86,15 @@ fn with_rails(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::{PcmFormat, SampleLayout};
+    use crate::io::{Decoder, PcmFormat, PcmFrames, SampleLayout, StatedScale};
 
     #[test]
     fn the_parts_of_complex_frames_are_one_channel() {
         let bytes: Vec<u8> = (1..=8u8).collect();
-        let frames = PcmFrames { layout: SampleLayout::packed(PcmFormat::S8), channels: 4, bytes: &bytes };
-        let captures = Captures::of_frames(&[frames], true).unwrap();
+        let stored = PcmFrames { layout: SampleLayout::packed(PcmFormat::S8), channels: 4, bytes: &bytes };
+        let mut decoder = Decoder::new(&stored, true, StatedScale::default()).unwrap();
+        let frames = decoder.decode(&stored).unwrap();
+        let captures = Captures::of_frames(&[frames]).unwrap();
         let of = |numbers: [f64; 2]| numbers.map(|x| x / 128.0).to_vec();
         let rails = Some((-1.0, 127.0 / 128.0));
         let first = ChannelSamples { samples: of([1.0, 5.0]), imaginary: Some(of([2.0, 6.0])), rails };

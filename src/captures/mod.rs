@@ -5,16 +5,18 @@
 //!
 //! ```
 //! use hybank::captures::Captures;
+//! use hybank::io::{Decoder, StatedScale};
 //! use hybank::runtime::{PcmFormat, PcmFrames, SampleLayout};
 //! // Two frames of two channels.
 //! let bytes: Vec<u8> = [0i16, -32768, 16384, 32767].into_iter().flat_map(i16::to_le_bytes).collect();
-//! let frames = PcmFrames { layout: SampleLayout::packed(PcmFormat::S16Le), channels: 2, bytes: &bytes };
-//! let captures = Captures::of_frames(&[frames], false)?;
+//! let stored = PcmFrames { layout: SampleLayout::packed(PcmFormat::S16Le), channels: 2, bytes: &bytes };
+//! let frames = Decoder::new(&stored, false, StatedScale::default())?.decode(&stored)?;
+//! let captures = Captures::of_frames(&[frames])?;
 //! assert_eq!(captures.channels[0].samples, [0.0, 0.5]);
 //! assert_eq!(captures.channels[1].rails, Some((-1.0, 32767.0 / 32768.0)));
 //! // Both samples of the second channel are at an end of their range.
 //! assert_eq!(captures.channels[1].record(None).clipped, 2);
-//! # Ok::<(), hybank::captures::CaptureError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod channel;

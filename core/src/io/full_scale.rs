@@ -36,6 +36,11 @@ impl StatedScale {
         self.given.or(of_spec).map(|scale| (scale, true)).or(of_header)
     }
 
+    /// True if samples stored so have another full scale than 1.
+    pub fn changes(self, header: &StreamHeader) -> bool {
+        self.of(header).is_some()
+    }
+
     /// Lowest and highest sample of an input, if its samples are codes.
     pub(super) fn rails(self, header: &StreamHeader) -> Option<(f64, f64)> {
         match self.of(header) {
@@ -106,6 +111,7 @@ pub(super) struct Scaling {
     is_open: bool,
     place: Place,
     codes: Codes,
+    rails: Option<(f64, f64)>,
     seen: Seen,
     frames: u64,
 }
@@ -133,6 +139,7 @@ impl Scaling {
             is_open: found.is_none() && !header.is_scaled,
             place: Place::Open,
             codes: Codes::default(),
+            rails: stated.rails(header),
             seen: Seen::new(stated.rails(header)),
             frames: 0,
         })
@@ -218,6 +225,11 @@ impl Scaling {
             "frame {frame} (from 0) of channel {channel} has the code {code}, beyond a full scale of {scale}; state the full \
              scale of the converter"
         )
+    }
+
+    /// Lowest and highest sample of codes; `None` for floats.
+    pub(super) fn rails(&self) -> Option<(f64, f64)> {
+        self.rails
     }
 
     /// What is odd about the samples; complete at the end.

@@ -31,6 +31,7 @@ mod block;
 mod byte_frames;
 mod capture;
 mod csv;
+mod decoded;
 mod error;
 #[cfg(feature = "flac")]
 mod flac;
@@ -64,6 +65,7 @@ pub use crate::runtime::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout
 pub use array::{ArrayHeader, ArrayReader};
 pub use block::{NumberFrames, RecordedFrames};
 pub use csv::CsvReader;
+pub use decoded::{DecodedFrames, Decoder};
 pub use error::{InputFault, InputWarning, IoError};
 pub use frame_file::FrameFile;
 pub use full_scale::{StatedScale, Word};

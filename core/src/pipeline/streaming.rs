@@ -113,10 +113,10 @@ impl<'a> Pipeline<'a> {
     pub fn push(&mut self, recordings: &[RecordedFrames<'_>], write: Write<'_>) -> Result<(), PipelineError> {
         let real: Vec<NumberFrames<'_>> = recordings.iter().map(|recording| recording.real).collect();
         if self.fusion.parts() == 1 {
-            return self.push_parts(&[&SideBySide(&real)], write);
+            return self.push_parts(&[&SideBySide::new(real)], write);
         }
         let imaginary: Vec<_> = recordings.iter().filter_map(|recording| recording.imaginary).collect();
-        self.push_parts(&[&SideBySide(&real), &SideBySide(&imaginary)], write)
+        self.push_parts(&[&SideBySide::new(real), &SideBySide::new(imaginary)], write)
     }
 
     /// Processes frames without a signal (zeros, once the offsets are subtracted) until `samples` samples

@@ -2,13 +2,21 @@
 
 use super::{Input, MOST_ROWS, SCRATCH, interleave_rows};
 use crate::{Isa, Sample};
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// Inputs whose channels follow each other; frames are those that all of them have.
-#[derive(Debug, Clone, Copy)]
-pub struct SideBySide<'a, I>(pub &'a [I]);
+#[derive(Debug, Clone)]
+pub struct SideBySide<'a, I: Clone>(Cow<'a, [I]>);
 
-impl<I: Input> Input for SideBySide<'_, I> {
+impl<'a, I: Clone> SideBySide<'a, I> {
+    /// The inputs in their order.
+    pub fn new(inputs: impl Into<Cow<'a, [I]>>) -> Self {
+        Self(inputs.into())
+    }
+}
+
+impl<I: Input + Clone> Input for SideBySide<'_, I> {
     fn channels(&self) -> usize {
         self.0.iter().map(Input::channels).sum()
     }
@@ -18,11 +26,11 @@ impl<I: Input> Input for SideBySide<'_, I> {
     }
 
     fn in_memory_f32(&self) -> Option<&[f32]> {
-        if let [alone] = self.0 { alone.in_memory_f32() } else { None }
+        if let [alone] = &*self.0 { alone.in_memory_f32() } else { None }
     }
 
     fn in_memory_f64(&self) -> Option<&[f64]> {
-        if let [alone] = self.0 { alone.in_memory_f64() } else { None }
+        if let [alone] = &*self.0 { alone.in_memory_f64() } else { None }
     }
 
     fn is_finite(&self, frames: Range<usize>) -> bool {
@@ -30,7 +38,7 @@ impl<I: Input> Input for SideBySide<'_, I> {
     }
 
     fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {
-        match self.0 {
+        match &*self.0 {
             [alone] => alone.load_f32(isa, first, samples),
             many if many.len() <= MOST_ROWS && many.iter().all(|input| input.channels() == 1) => {
                 interleave_rows(isa, many.len(), samples, |i, start, row| {
@@ -42,7 +50,7 @@ impl<I: Input> Input for SideBySide<'_, I> {
     }
 
     fn load_f64(&self, isa: Isa, first: usize, samples: &mut [f64]) {
-        match self.0 {
+        match &*self.0 {
             [alone] => alone.load_f64(isa, first, samples),
             many => load_each(many, isa, first, samples),
         }

@@ -19,7 +19,7 @@ fn calls_and_banks_that_do_not_fit_are_refused() {
     assert_eq!(stream.process(&[], &mut out), Ok(0));
     let mut output = PcmOutput::packed(PcmFormat::S8, &mut []);
     assert_eq!(
-        stream.run(&SideBySide::<Zeros>(&[]), &mut output),
+        stream.run(&SideBySide::new(&[] as &[Zeros]), &mut output),
         Err(ProcessError::Channels { given: 0, wanted: 2 })
     );
 

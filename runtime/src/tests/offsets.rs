@@ -114,7 +114,7 @@ fn offsets_are_subtracted_in_every_form_of_the_samples() {
                 stored.iter().map(|bytes| PcmFrames { layout, channels: count, bytes }).collect();
             let mut bytes = vec![0; 4 * FRAMES * m];
             let mut output = PcmOutput::packed(PcmFormat::F32Le, &mut bytes);
-            Stream::new(&subtracting).run(&SideBySide(&parts), &mut output).unwrap();
+            Stream::new(&subtracting).run(&SideBySide::new(parts), &mut output).unwrap();
             let got = bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap()));
             // Doubles are rounded once, where they are stored.
             let close = got.zip(&want).all(|(a, &b)| (a - b).abs() <= 1e-6);

@@ -40,7 +40,7 @@ fn check_bytes(bank: &Bank, options: Options, [from, to]: [PcmFormat; 2], bytes:
     let columns = columns(bytes, n, from.bytes());
     let planar: Vec<_> = columns.iter().map(|bytes| PcmFrames { layout, channels: 1, bytes }).collect();
     let one = PcmFrames { layout, channels: n, bytes };
-    for recordings in [&one as &dyn Input, &SideBySide(&planar)] {
+    for recordings in [&one as &dyn Input, &SideBySide::new(&planar[..])] {
         stream.reset();
         let mut out = vec![0; want.0.len()];
         let mut output = PcmOutput::packed(to, &mut out);

@@ -101,8 +101,8 @@ fn threads_do_not_change_a_byte() {
         let mut want = PcmOutput::packed(out_format, want);
         let mut got = PcmOutput::packed(out_format, got);
         (want.clipped, got.clipped) = (5, 5);
-        one.run(&SideBySide(&frames), &mut want).unwrap();
-        many.run_parallel(&SideBySide(&frames), &mut got, &pools).unwrap();
+        one.run(&SideBySide::new(&frames[..]), &mut want).unwrap();
+        many.run_parallel(&SideBySide::new(&frames[..]), &mut got, &pools).unwrap();
         assert_eq!(want.clipped, got.clipped);
         assert!(want.clipped > 5 || out_format == PcmFormat::F64Le);
         assert!(want.bytes == got.bytes, "{format} to {out_format}");

@@ -113,7 +113,8 @@ fn samples_as_they_lie_in_files() {
                 let recordings = vec![PcmFrames { layout, channels, bytes }; n / channels];
                 let mut output = PcmOutput::packed(to, &mut out);
                 let form = format!("{from} to {to}");
-                let written = quiet(&plan, &form, || stream.run(&SideBySide(&recordings), &mut output));
+                let written =
+                    quiet(&plan, &form, || stream.run(&SideBySide::new(&recordings[..]), &mut output));
                 assert_eq!(written, Ok(frames * M));
             }
         }

@@ -32,7 +32,7 @@ fn frames_are_read_where_they_lie() {
         assert!(apart.in_memory_f32().is_none());
     }
     assert!(whole.in_memory_f64().is_none());
-    assert!(SideBySide(&[whole, whole]).in_memory_f32().is_none());
+    assert!(SideBySide::new(&[whole, whole][..]).in_memory_f32().is_none());
     assert!(whole.part(1).in_memory_f32().is_none());
 }
 

@@ -87,8 +87,13 @@ fn a_whole_signal_has_the_bits_of_the_command() {
             let stored = both.each_ref().map(|x| x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>());
             let layout = SampleLayout::packed(PcmFormat::F32Le);
             let recordings = stored.each_ref().map(|bytes| PcmFrames { layout, channels: 1, bytes });
-            let (want, outcome) =
-                command(&bank, &plan, &[&SideBySide(&recordings)], settings.clone(), (format, false));
+            let (want, outcome) = command(
+                &bank,
+                &plan,
+                &[&SideBySide::new(&recordings[..])],
+                settings.clone(),
+                (format, false),
+            );
             let planes = both.each_ref().map(Vec::as_slice);
             let mut bytes = vec![0; frames * ratio * format.bytes()];
             let mut output = PcmOutput::packed(format, &mut bytes);
