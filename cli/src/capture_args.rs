@@ -22,6 +22,9 @@ pub(super) struct CaptureArgs {
     /// Interleaved channels of each raw capture [default: 1 each, or all in a single capture]
     #[arg(long, value_name = "C", value_parser = clap::value_parser!(u16).range(1..))]
     channels: Option<u16>,
+    /// Each pair of channels is a complex sample, as receivers write I and Q to WAV
+    #[arg(long)]
+    iq: bool,
     #[command(flatten)]
     pub(super) scale: ScaleArgs,
     /// Use only this channel of each capture, from 1
@@ -52,7 +55,8 @@ impl CaptureArgs {
         let channels = self.channels.map(|channels| format!(" --channels {channels}"));
         let scale = self.scale.given().map(|scale| format!(" --full-scale {scale}"));
         let channel = self.channel.map(|channel| format!(" --channel {channel}"));
-        [format, channels, scale, channel].into_iter().flatten().collect()
+        let iq = self.iq.then(|| " --iq".to_owned());
+        [format, channels, iq, scale, channel].into_iter().flatten().collect()
     }
 
     /// For a recording that the one called `file` is compared with: what the options say of the format holds
@@ -73,6 +77,7 @@ impl CaptureArgs {
             coding: self.format,
             channels: self.channels.map(usize::from),
             only: self.channel.map(|channel| usize::from(channel) - 1),
+            is_iq: self.iq,
             full_scale: self.scale.given(),
         }
     }

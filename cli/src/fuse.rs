@@ -5,7 +5,7 @@ use super::before_after::{self, BeforeAfterArgs};
 use super::bit_true::BitTrueArgs;
 use super::capture_args::CaptureArgs;
 use super::observer::RunObserver;
-use super::output::{bits, check_files};
+use super::output::{bits, check_files, container_of};
 use super::print::{Failure, is_dash, print, print_report, say_understood};
 use super::run::{Finished, Job, RunArgs, RunReport};
 use super::tracked::{self, TrackArgs};
@@ -126,7 +126,7 @@ impl Args {
             check_files(&self.output, Container::Wav, &[], &[table])?;
         }
         let prints = self.before_after.is_wanted();
-        self.run.check(&self.bank, &self.inputs, &self.output, Container::Wav, prints)
+        self.run.check(&self.bank, &self.inputs, &self.output, container_of(&self.output), prints)
     }
 
     fn job<'a>(&'a self, bank: &'a Bank) -> Job<'a> {
@@ -135,7 +135,7 @@ impl Args {
             bank,
             bank_path: &self.bank,
             output: &self.output,
-            container: Container::Wav,
+            container: container_of(&self.output),
             format: self.bits,
             dropped: if self.keep_latency { DroppedLatency::Added } else { DroppedLatency::All },
             is_live: false,

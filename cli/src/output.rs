@@ -46,13 +46,19 @@ pub(super) fn is_wav(output: &Path) -> bool {
     WAV.contains(&extension.to_ascii_lowercase().as_str()) && !is_pipe(output)
 }
 
+/// The container of a file of samples by its name.
+pub(super) fn container_of(output: &Path) -> Container {
+    let is_npy = output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npy"));
+    if is_npy && !is_pipe(output) { Container::Npy } else { Container::Wav }
+}
+
 /// Refuses a name that promises another format than the one written; pipes have any name.
 fn check_extension(output: &Path, container: Container) -> Result<(), Failure> {
     let extension = output.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     let extension = extension.to_ascii_lowercase();
     let remedy = match (extension.as_str(), container) {
         _ if is_pipe(output) => return Ok(()),
-        ("sigmf-meta", _) => return Ok(()),
+        ("sigmf-meta", _) | ("npy", Container::Npy) => return Ok(()),
         ("sigmf" | "sigmf-data", _) => {
             format!("name it {}", Quoted(output.with_extension("sigmf-meta")))
         }

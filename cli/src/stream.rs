@@ -127,7 +127,13 @@ impl Args {
         // Before the inputs come; their headers may say complex samples.
         let plan = job.plan()?;
         let channels = self.channels.map(usize::from);
-        let format = FileFormat { coding: self.format, channels, only: None, full_scale: self.scale.given() };
+        let format = FileFormat {
+            coding: self.format,
+            channels,
+            only: None,
+            is_iq: false,
+            full_scale: self.scale.given(),
+        };
         let mut reader = job.start_reader(inputs, format, &mut |stall| observer.stalled(stall))?;
         self.check_output(reader.is_complex())?;
         let finished = job.run(&plan, &mut reader, observer, &|_| {})?;

@@ -334,6 +334,7 @@ def read(
     format: str = "wav",
     channels: int | None = None,
     channel: int | None = None,
+    iq: bool = False,
     full_scale: float | str | None = None,
     sample_bits: int | None = None,
     interleaved: int | None = None,

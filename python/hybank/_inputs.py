@@ -49,7 +49,7 @@ def _are_files(x):
 
 @checked
 def read(
-    files, *, bank=None, format="wav", channels=None, channel=None, full_scale=None, sample_bits=None, interleaved=None,
+    files, *, bank=None, format="wav", channels=None, channel=None, iq=False, full_scale=None, sample_bits=None, interleaved=None,
     lost=None, max_lost=None, longest=False
 ):
     """Read recordings as ``hybank fuse`` reads them.
@@ -66,6 +66,8 @@ def read(
         Interleaved channels of each raw file.
     channel : int, optional
         Read only this channel of each file, from 1.
+    iq : bool
+        Pairs of channels are the real and the imaginary parts of complex samples.
     full_scale : float or str, optional
         Full scale of the converters: a number, or "12bits", "u12bits". WAV and FLAC state it, the bank may.
     sample_bits : int, optional
@@ -99,7 +101,7 @@ def read(
         raise HybankError("interleaved: give the bank, whose delays say in which order the converters take turns")
     options = {
         "format": format, "channels": channels, "channel": channel,
-        "full_scale": full_scale, "interleaved": interleaved,
+        "iq": iq, "full_scale": full_scale, "interleaved": interleaved,
         "lost": lost, "max_lost": max_lost, "longest": longest,
     }
     return _read(files, bank, options)
@@ -109,7 +111,7 @@ def _read(files, source, options):
     """Recordings for a bank, for a spec, or for nothing in particular."""
     names = [files] if isinstance(files, (str, os.PathLike)) else list(files)
     usual = dict.fromkeys(("channels", "channel", "full_scale", "interleaved", "lost", "max_lost"))
-    options = {"format": "wav", "longest": False, **usual, **options}
+    options = {"format": "wav", "iq": False, "longest": False, **usual, **options}
     found = _hybank.read(names, options, source)
     parts = found["channels"]
     is_even = all(len(part) == len(parts[0]) for part in parts)

@@ -23,6 +23,7 @@ pub(crate) struct Options<'py> {
     format: String,
     channels: Option<usize>,
     channel: Option<usize>,
+    iq: bool,
     full_scale: Option<Bound<'py, PyAny>>,
     interleaved: Option<usize>,
     lost: Option<PathBuf>,
@@ -108,6 +109,7 @@ impl Options<'_> {
             coding: self.format.parse().map_err(|error| refused(format!("format: {error}")))?,
             channels: self.channels,
             only: self.channel.map(|channel| channel.saturating_sub(1)),
+            is_iq: self.iq,
             full_scale: formats::full_scale(self.full_scale.as_ref())?,
         })
     }

@@ -9,6 +9,7 @@ use crate::adapters::SplitOutput;
 use crate::adapters::{Input, Output};
 use crate::algorithms::{Direct, Facts, Filter, OverlapSave, Recursive};
 use crate::sample::Sample;
+use crate::simd::flushing;
 use crate::state::{Count, Numbers};
 use std::sync::Arc;
 
@@ -61,7 +62,7 @@ impl Engine {
 
     /// See [`Filter::process`].
     pub(crate) fn process(&mut self, input: &dyn Input, output: &mut dyn Output) -> u64 {
-        each!(self, it => it.filter.process(&mut it.state, input, output))
+        each!(self, it => flushing(|| it.filter.process(&mut it.state, input, output)))
     }
 
     /// As [`Engine::process`], on several threads if the algorithm is the direct one.

@@ -9,6 +9,7 @@ use crate::Sample;
 use crate::adapters::{Frames, Input, Output, SplitOutput};
 use crate::algorithms::Filter;
 use crate::algorithms::direct::{Direct, DirectState};
+use crate::simd::flushing;
 use std::io;
 use std::ops::Range;
 
@@ -33,7 +34,7 @@ pub(crate) fn process<T: Sample>(
     let frame_multiply_adds = (filter.multiply_adds() * filter.ratio as f64) as usize;
     let least = CHUNK_MULTIPLY_ADDS.div_ceil(frame_multiply_adds).max(4 * filter.history_frames());
     if pool.threads() == 1 || frames < 2 * least {
-        return filter.process(state, input, output);
+        return flushing(|| filter.process(state, input, output));
     }
     let chunk = least.max(frames / (CHUNKS_PER_THREAD * pool.threads()));
     let call = Call { filter, input, chunk };
@@ -86,10 +87,10 @@ impl<T: Sample> Call<'_, T> {
     ) -> (u64, Option<DirectState<T>>) {
         let chunk = Frames::new(self.input, frames.clone());
         match state {
-            Some(state) => (self.filter.process(state, &chunk, output), None),
+            Some(state) => (flushing(|| self.filter.process(state, &chunk, output)), None),
             None => {
                 let mut own = self.filter.state_at(self.input, frames.start);
-                (self.filter.process(&mut own, &chunk, output), Some(own))
+                (flushing(|| self.filter.process(&mut own, &chunk, output)), Some(own))
             }
         }
     }

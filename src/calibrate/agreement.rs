@@ -22,6 +22,13 @@ const LEAST_LEVEL: f64 = 1e-3;
 /// A gain this far from that of the spec, beyond what the spec allows, contradicts it. Converters that are
 /// not calibrated differ by a few per cent.
 const GAIN_ERROR: f64 = 0.05;
+/// The means of two channels, less their offsets in the spec, differ by this share of the rms where converters
+/// are not calibrated: an image of -40 dB.
+const OFFSET_SHARE: f64 = 0.02;
+/// Samples of this size, of full scale, are no samples of a converter.
+const BEYOND_FULL_SCALE: f64 = 1e3;
+/// Decibels that the comparison of short spectra can vouch for.
+const MOST_VOUCHED: f64 = 120.0;
 /// The spec explains captures that leave this share of their power unexplained.
 const UNEXPLAINED_SHARE: f64 = 0.1;
 
@@ -38,17 +45,14 @@ pub struct Agreement {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Verdict {
-    /// One alias per band, at the delays and gains of the spec, has this share of their power.
-    #[error(
-        "the captures agree with the spec, which explains at least {} % of their power",
-        (1e4 * .0).floor().min(9999.0) / 100.0
-    )]
+    /// One alias per band, at the delays and gains of the spec, has this share of their power. The rest is
+    /// what a bank for the spec gets wrong, whatever it promises.
+    #[error("the captures agree with the spec, and vouch for an SNR of {:.0} dB", vouched(*.0))]
     Explained(f64),
     /// The same, and the signal does not tell its delays.
     #[error(
-        "the captures agree with the spec in starts, polarities, gains and order, but this signal does not tell its \
-         delays; it explains at least {} % of their power",
-        (1e4 * .0).floor().min(9999.0) / 100.0
+        "the captures agree with the spec in starts, polarities, gains and order, which vouches for no SNR, as this \
+         signal does not tell its delays"
     )]
     DelaysUntold(f64),
     /// Aliases overlap, or the signal fits other starts as well.
@@ -75,6 +79,11 @@ pub enum Verdict {
     /// Nothing compared them.
     #[error("the captures were not compared with the spec")]
     Unjudged,
+}
+
+/// The SNR in decibels where a spec explains this share of the power, at most [`MOST_VOUCHED`].
+fn vouched(share: f64) -> f64 {
+    (-10.0 * (1.0 - share).log10()).min(MOST_VOUCHED)
 }
 
 impl From<Verdict> for Agreement {
@@ -142,6 +151,10 @@ pub fn agreement(spec: &Spec, records: &[Record]) -> Agreement {
     if levels.iter().all(|level| *level == 0.0) {
         return Agreement::from(Verdict::NoSignal);
     }
+    let beyond = (0..levels.len()).find(|i| levels[*i] > BEYOND_FULL_SCALE);
+    if let Some(channel) = beyond.filter(|_| spec.full_scale.is_none()) {
+        return contradicted(vec![Contradiction::Beyond { channel: channel + 1, level: levels[channel] }]);
+    }
     let without_signal = without_signal(spec, &levels);
     if !without_signal.is_empty() {
         return contradicted(without_signal);
@@ -154,7 +167,11 @@ pub fn agreement(spec: &Spec, records: &[Record]) -> Agreement {
     }
     match starts(&model, records) {
         None => contradicted(delays.contradictions),
-        Some(found) => judged(spec, &found, delays),
+        Some(found) => {
+            let mut judged = judged(spec, &found, delays);
+            judged.contradictions.extend(offsets(spec, &levels, records));
+            judged
+        }
     }
 }
 
@@ -216,6 +233,22 @@ fn gains(spec: &Spec, found: &Starts) -> Vec<Contradiction> {
         is_wrong.then_some(Contradiction::Gain { channel: i + 1, ratio, gain: ratio * spec.channels[i].gain })
     };
     found.gains.iter().enumerate().filter_map(contradiction).collect()
+}
+
+/// Means that differ from those of all channels by more than their offsets in the spec do.
+fn offsets(spec: &Spec, levels: &[f64], records: &[Record]) -> Vec<Contradiction> {
+    let stated = spec.uncertainty.as_ref().map(|table| table.offsets(records.len()));
+    let stated = stated.unwrap_or_else(|| vec![0.0; records.len()]);
+    let means: Vec<f64> =
+        records.iter().zip(&spec.channels).map(|(record, channel)| record.mean() - channel.offset).collect();
+    let usual = means.iter().sum::<f64>() / means.len() as f64;
+    let contradiction = |(i, mean): (usize, &f64)| {
+        let apart = mean - usual;
+        let is_wrong = apart.abs() > stated[i] + OFFSET_SHARE * levels[i];
+        let offset = apart + spec.channels[i].offset;
+        is_wrong.then_some(Contradiction::Offset { channel: i + 1, apart, offset })
+    };
+    means.iter().enumerate().filter_map(contradiction).collect()
 }
 
 #[cfg(test)]
@@ -331,6 +364,40 @@ mod tests {
         assert_eq!(changed(0.0), [Contradiction::NoSignal { channel: 2, level: 0.0 }]);
         let zeros = [vec![0.0; 4096], vec![0.0; 4096]];
         assert_eq!(found(&zeros).verdict, Verdict::NoSignal);
+    }
+
+    #[test]
+    fn offsets_and_wild_samples_are_reported_for_what_they_are() {
+        let mut dice = Random(54);
+        let good = recorded(20_000, 0.0, &mut dice);
+        let with = |offsets: [f64; 2]| {
+            let shifted =
+                good.iter().zip(offsets).map(|(record, offset)| record.iter().map(|x| x + offset).collect());
+            found(&shifted.collect::<Vec<_>>()).contradictions
+        };
+        assert_eq!(with([0.2, 0.2]), []);
+        let apart = with([0.1, -0.05]);
+        let [
+            Contradiction::Offset { channel: 1, offset: first, .. },
+            Contradiction::Offset { offset: second, .. },
+        ] = apart[..]
+        else {
+            panic!("{apart:?}")
+        };
+        assert!((first - 0.075).abs() < 0.01 && (second + 0.075).abs() < 0.01, "{apart:?}");
+        let wild = vec![good[0].clone(), good[1].iter().map(|x| 1e37 * x).collect()];
+        let Contradiction::Beyond { channel: 2, .. } = found(&wild).contradictions[0] else { panic!() };
+    }
+
+    /// A gain that is wrong by 4 % costs the bank what the verdict says.
+    #[test]
+    fn an_agreement_vouches_for_no_more_than_the_gains_allow() {
+        let mut dice = Random(55);
+        let mut records = recorded(20_000, 0.0, &mut dice);
+        records[1].iter_mut().for_each(|x| *x *= 1.04);
+        let Verdict::Explained(share) = found(&records).verdict else { panic!() };
+        // Half of the difference is in each channel: 20 log10(2 / 0.04) = 34 dB.
+        assert!((vouched(share) - 34.0).abs() < 1.0, "{}", vouched(share));
     }
 
     /// A tone fits many starts.

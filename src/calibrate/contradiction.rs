@@ -61,6 +61,31 @@ pub enum Contradiction {
         /// What the gain of the spec would be.
         gain: f64,
     },
+    /// A capture has another mean than the others.
+    #[error(
+        "the samples of channel {channel} lie {apart:.4} of full scale from the mean of all channels: an offset gives spurs \
+         at the sample rate; write `offset = {offset:.4}` in the spec, or measure it with `hybank calibrate`, and design \
+         the bank again"
+    )]
+    Offset {
+        /// From 1.
+        channel: usize,
+        /// Its mean less that of all channels, each less the offset of the spec.
+        apart: f64,
+        /// What the offset of the spec would be.
+        offset: f64,
+    },
+    /// Samples are far beyond full scale.
+    #[error(
+        "the samples of channel {channel} have an rms of {level:.1e} times full scale; state the full scale, or look for \
+         damaged samples"
+    )]
+    Beyond {
+        /// From 1.
+        channel: usize,
+        /// The rms.
+        level: f64,
+    },
     /// A capture began before the others, or after them.
     #[error("the capture of channel {channel} began {}", began(*early, *seconds))]
     Start {

@@ -57,6 +57,12 @@ impl Record {
         Self { samples, imaginary: Some(others), keep, clipped }
     }
 
+    /// The mean of the kept samples, or of their real parts.
+    pub fn mean(&self) -> f64 {
+        let kept = self.samples.iter().zip(&self.keep).filter(|(_, keep)| **keep);
+        kept.map(|(x, _)| x).sum::<f64>() / self.used().max(1) as f64
+    }
+
     /// The kept samples, or real parts.
     pub(crate) fn channel(&self) -> Channel<'_> {
         Channel { keep: Some(&self.keep), ..Channel::new(&self.samples) }

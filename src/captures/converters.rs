@@ -16,6 +16,8 @@ pub struct FileFormat {
     pub channels: Option<usize>,
     /// The only channel to read of each file, from 0.
     pub only: Option<usize>,
+    /// Pairs of channels are complex samples.
+    pub is_iq: bool,
     /// Full scale of the converters.
     pub full_scale: Option<FullScale>,
 }
@@ -23,11 +25,11 @@ pub struct FileFormat {
 impl FileFormat {
     /// Of so many files that together have `channels` channels.
     pub fn options(self, files: usize, channels: usize) -> ReadOptions<'static> {
-        let Self { coding, only, full_scale, .. } = self;
+        let Self { coding, only, is_iq, full_scale, .. } = self;
         let usual = if files == 1 && only.is_none() { channels } else { 1 };
         let channels = self.channels.unwrap_or(usual);
         let scale = StatedScale { given: full_scale, ..StatedScale::default() };
-        ReadOptions { coding, channels, only, scale, ..ReadOptions::files() }
+        ReadOptions { coding, channels, only, is_iq, scale, ..ReadOptions::files() }
     }
 }
 

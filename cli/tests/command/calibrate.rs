@@ -206,7 +206,7 @@ fn bits_of_codes_and_what_the_spec_fits() {
     refused(&["--sample-bits", "12", "--tone", "62.3MHz"], 1, &missing);
 }
 
-/// Codes from 0 on that are read as signed ones look like offsets of full scale, which a warning says.
+/// Codes from 0 on that are read as signed ones are beyond these, which the error says.
 #[test]
 fn offset_binary_codes_are_named() {
     let (desk, mut dice) = (Desk::with_spec(NOMINAL), Random(9));
@@ -219,7 +219,7 @@ fn offset_binary_codes_are_named() {
         (done.status.code(), text(&done.stderr))
     };
     let (_, shown) = run(&["--sample-bits", "12"]);
-    assert!(shown.contains("offset-binary") && shown.contains("--full-scale u8bits"), "{shown}");
+    assert!(shown.contains("codes that count from 0 are u12bits"), "{shown}");
     assert_eq!(run(&["--full-scale", "u12bits"]), (Some(0), String::new()));
 }
 

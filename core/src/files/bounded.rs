@@ -30,6 +30,9 @@ pub fn read_bytes(path: &Path, bound: Bound) -> Result<Vec<u8>, FileError> {
     bytes_of(file, &name, bound)
 }
 
+/// What some editors write before a text.
+const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
+
 /// The text of a file.
 ///
 /// # Errors
@@ -53,11 +56,14 @@ pub fn bytes_of(stream: impl Read, name: &str, bound: Bound) -> Result<Vec<u8>, 
     Ok(bytes)
 }
 
-/// The text that `bytes`, read from what is called `name`, hold.
+/// The text that `bytes`, read from what is called `name`, hold; some editors mark its beginning.
 ///
 /// # Errors
 /// [`FileError::NotText`].
-pub fn text_in(bytes: Vec<u8>, name: &str) -> Result<String, FileError> {
+pub fn text_in(mut bytes: Vec<u8>, name: &str) -> Result<String, FileError> {
+    if bytes.starts_with(BYTE_ORDER_MARK) {
+        bytes.drain(..BYTE_ORDER_MARK.len());
+    }
     String::from_utf8(bytes).map_err(|error| FileError::NotText {
         file: name.to_owned(),
         offset: error.utf8_error().valid_up_to(),

@@ -113,12 +113,13 @@ impl Block {
         }
     }
 
-    /// Appends frames of real numbers.
+    /// Appends frames of numbers; those of the parts of complex samples take turns.
     pub(super) fn extend(&mut self, more: impl IntoIterator<Item = f64>) {
-        if let Some(part) = self.parts.first_mut() {
-            match part {
-                Numbers::F32(numbers) => numbers.extend(more.into_iter().map(|x| x as f32)),
-                Numbers::F64(numbers) => numbers.extend(more),
+        let parts = self.parts.len().max(1);
+        for (k, x) in more.into_iter().enumerate() {
+            match &mut self.parts[k % parts] {
+                Numbers::F32(numbers) => numbers.push(x as f32),
+                Numbers::F64(numbers) => numbers.push(x),
             }
         }
     }

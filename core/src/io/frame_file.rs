@@ -51,8 +51,12 @@ impl FrameFile {
                     "frames were lost (core:global_index jumps); fuse the whole recording, which fills them";
                 return Err(IoError::unfit(&name)(problem.into()));
             }
+            let Some(beginning) = reader.beginning() else {
+                let problem = "its captures have headers between their samples; fuse the whole recording";
+                return Err(IoError::unfit(&name)(problem.into()));
+            };
             let [_, data] = sigmf_files(path);
-            (data, 0, reader.stream_header())
+            (data, beginning, reader.stream_header())
         } else {
             let reader = WavReader::new(open_file(path)?, &name)?;
             (path.to_owned(), reader.header().data_offset, reader.stream_header())

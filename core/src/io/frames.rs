@@ -40,9 +40,10 @@ impl InputFrames {
     /// [`IoError`]: those of the input, or a header that does not fit the settings.
     pub(super) fn open(source: &InputSource) -> Result<Self, IoError> {
         let (capture, name) = (source.open()?, source.name());
-        let stored = capture.stream_header();
+        let stored = source.complex(capture.stream_header())?;
         let header = source.chosen(stored)?;
         let scaling = Scaling::new(&stored, source.scale).map_err(IoError::unfit(&name))?;
+        let scaling = if source.is_table_or_array() { scaling.of_table() } else { scaling };
         let mut begun = Block::default();
         begun.begin(&stored);
         Ok(Self { source: source.clone(), name, capture, stored, scaling, begun, ended: false, header })
@@ -85,6 +86,20 @@ impl InputFrames {
 }
 
 impl InputSource {
+    /// The header of an input whose pairs of channels are complex samples.
+    fn complex(&self, header: StreamHeader) -> Result<StreamHeader, IoError> {
+        match header.channels {
+            _ if !self.is_iq || header.is_complex => Ok(header),
+            channels if channels % 2 == 0 => {
+                Ok(StreamHeader { channels: channels / 2, is_complex: true, ..header })
+            }
+            channels => Err(IoError::unfit(&self.name())(format!(
+                "{}, but pairs of I and Q are asked for; read its channels as real ones",
+                counted(channels, "channel")
+            ))),
+        }
+    }
+
     /// As the consumer sees an input that states `header`: time-interleaved converters as channels, or the
     /// only channel that is read.
     pub(super) fn chosen(&self, header: StreamHeader) -> Result<StreamHeader, IoError> {

@@ -8,11 +8,16 @@ use super::block::{Block, Numbers, with_numbers};
 use super::{InputFault, StreamHeader};
 use crate::quantity::FullScale;
 use crate::runtime::{PcmFormat, Sample};
+use std::f64::consts::FRAC_2_PI;
 
 /// A quiet signal leaves one or two bits of its converter unused; more are unusual enough to be said.
 const UNUSED_BITS: u32 = 3;
 /// Fewer codes do not tell which bits a converter has.
 const ENOUGH_CODES: u64 = 256;
+/// So many times as often as a sine of full scale does a signal that is clipped reach the ends of the range.
+const CLIPPED_FACTOR: f64 = 2.0;
+/// Floats of streams have full scale 1 by convention, and may exceed it; nobody means so many times as much.
+const WILD_PEAK: f64 = 1e3;
 
 /// What is stated of the full scale of inputs.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -109,6 +114,8 @@ pub(super) struct Scaling {
     is_binding: bool,
     /// Nobody states the full scale of integers.
     is_open: bool,
+    /// Floats beyond it are said.
+    usual_peak: f64,
     place: Place,
     codes: Codes,
     rails: Option<(f64, f64)>,
@@ -137,12 +144,18 @@ impl Scaling {
             scale,
             is_binding: found.is_some_and(|(_, is_binding)| is_binding),
             is_open: found.is_none() && !header.is_scaled,
+            usual_peak: WILD_PEAK,
             place: Place::Open,
             codes: Codes::default(),
             rails: stated.rails(header),
             seen: Seen::new(stated.rails(header)),
             frames: 0,
         })
+    }
+
+    /// The same for floats of a table or an array, which may be codes.
+    pub(super) fn of_table(self) -> Self {
+        Self { usual_peak: 1.0, ..self }
     }
 
     /// Takes the frames of a block from frame `first` on.
@@ -221,9 +234,15 @@ impl Scaling {
         let scale = self.scale.unwrap_or(FullScale::Number(1.0));
         let code = sample * scale.amplitude() + scale.middle();
         let (frame, channel) = (self.frames + (at / channels) as u64, at % channels + 1);
+        let from_0 = match scale {
+            FullScale::Signed(bits) if self.seen.least >= 0.0 => {
+                format!("; codes that count from 0 are u{bits}bits")
+            }
+            _ => String::new(),
+        };
         format!(
-            "frame {frame} (from 0) of channel {channel} has the code {code}, beyond a full scale of {scale}; state the full \
-             scale of the converter"
+            "frame {frame} (from 0) of channel {channel} has the code {code}, beyond a full scale of {scale}; state \
+             that of the converter{from_0}"
         )
     }
 
@@ -239,10 +258,15 @@ impl Scaling {
         let (peak, is_float) = (self.seen.peak(), self.word.is_none());
         let likely =
             if self.seen.are_whole { FullScale::of_codes(self.seen.least, self.seen.most) } else { None };
-        let beyond = (is_float && peak > 1.0).then_some(InputFault::BeyondFullScale { peak, likely });
+        let beyond =
+            (is_float && peak > self.usual_peak).then_some(InputFault::BeyondFullScale { peak, likely });
         let Seen { count, at_rails, .. } = self.seen;
-        let clipped =
-            (peak <= 1.0 && at_rails > 0).then_some(InputFault::AtRails { count: at_rails, of: count });
+        let clipped = self.rails.is_some_and(|(_, highest)| {
+            // A sine of full scale is within half a step of an end of the range for this share of the time.
+            let of_sine = FRAC_2_PI * (1.0 - highest).sqrt();
+            peak <= 1.0 && at_rails as f64 > CLIPPED_FACTOR * of_sine * count as f64
+        });
+        let clipped = clipped.then_some(InputFault::AtRails { count: at_rails, of: count });
         unused.into_iter().chain(beyond).chain(clipped)
     }
 }
@@ -352,7 +376,7 @@ mod tests {
         stated: StatedScale,
         bytes: &[u8],
     ) -> Result<(Vec<f64>, Vec<InputFault>), String> {
-        let mut scaling = Scaling::new(&header, stated)?;
+        let mut scaling = Scaling::new(&header, stated)?.of_table();
         let mut samples = Vec::new();
         for bytes in bytes.chunks(3 * header.layout.container) {
             let mut block = Block::default();
@@ -397,7 +421,7 @@ mod tests {
         };
         assert_eq!(faults(&[0.5, -0.5, 0.25]), []);
         assert_eq!(faults(&[]), []);
-        assert_eq!(faults(&[1.0, 1.0, 0.25, -1.0]), [InputFault::AtRails { count: 3, of: 4 }]);
+        assert_eq!(faults(&[1.0, 1.0, 0.25, -1.0]), []);
         let beyond = |peak, likely| [InputFault::BeyondFullScale { peak, likely }];
         assert_eq!(faults(&[f64::NAN, -100.0, 127.0]), beyond(127.0, Some(FullScale::Signed(8))));
         assert_eq!(faults(&[0.0, 4000.0]), beyond(4000.0, Some(U12)));

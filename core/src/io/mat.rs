@@ -1,7 +1,7 @@
 //! Captures as MATLAB files (.mat) of versions 5 to 7.2.
 //!
-//! Source: MathWorks, *MAT-File Format*, level 5. The numeric arrays of a file are its captures: integers of
-//! up to 32 bits and floats, real or complex, compressed or not. `x.mat:name` chooses a variable; otherwise
+//! Source: MathWorks, *MAT-File Format*, level 5. The numeric arrays of a file are its captures: integers
+//! and floats, real or complex, compressed or not. `x.mat:name` chooses a variable; otherwise
 //! it is the only array. A number called `fs` gives the rate.
 
 use super::array::{ArrayHeader, ArrayReader};
@@ -221,7 +221,7 @@ impl Variable {
         })?;
         // Integers are codes, which the format divides by its full scale.
         let full_scale = if format.is_float() { 1.0 } else { 2f64.powi(8 * format.bytes() as i32 - 1) };
-        let middle = if format == PcmFormat::U8 { full_scale } else { 0.0 };
+        let middle = if format.is_unsigned() { full_scale } else { 0.0 };
         let mut sample = vec![0; format.bytes()];
         for k in 0..count as usize {
             for numbers in &parts {
@@ -249,10 +249,13 @@ impl Variable {
             8 => PcmFormat::S8,
             9 => PcmFormat::U8,
             10 => PcmFormat::S16Le,
+            11 => PcmFormat::U16Le,
             12 => PcmFormat::S32Le,
+            13 => PcmFormat::U32Le,
+            14 => PcmFormat::S64Le,
             _ => {
                 return Err(format!(
-                    "it is {}; save double, single, int8, uint8, int16 or int32, for example double(x)",
+                    "it is {}; save double, single, int8 to int64 or uint8 to uint32, for example double(x)",
                     self.class_name()
                 ));
             }

@@ -46,6 +46,7 @@ mod mat_element;
 mod multi_reader;
 mod notes;
 mod npy;
+mod npy_writer;
 mod offline;
 mod open;
 mod pipe;

@@ -77,6 +77,7 @@ impl MultiReader {
             coding: options.coding,
             channels: options.channels,
             only: options.only,
+            is_iq: options.is_iq,
             scale: options.scale,
             interleaving: interleaving.cloned(),
             per_frame: options.samples_per_frame.get(i).copied().unwrap_or(1),

@@ -14,18 +14,14 @@ use std::collections::HashSet;
 const OF_THE_FILE: [&str; 4] =
     ["core:sha512", "core:trailing_bytes", "core:metadata_only", "core:collection"];
 
-/// Where the Broadcast Wave chunk counts the samples since midnight (EBU Tech 3285).
-const TIME_REFERENCE: std::ops::Range<usize> = 338..346;
-
 /// A chunk with its count of samples since midnight at the output's rate; the output begins earlier by its
 /// shift.
 fn moved(chunk: &WavChunk, placement: Placement) -> WavChunk {
     let mut chunk = chunk.clone();
-    if let (b"bext", Some(Ok(field))) = (&chunk.id, chunk.bytes.get(TIME_REFERENCE).map(<[u8; 8]>::try_from))
-    {
-        let samples = u64::from_le_bytes(field).saturating_mul(placement.ratio) / placement.per_frame.max(1);
+    if let Some(count) = chunk.time_reference() {
+        let samples = count.saturating_mul(placement.ratio) / placement.per_frame.max(1);
         let samples = samples.saturating_sub(placement.shift);
-        chunk.bytes[TIME_REFERENCE].copy_from_slice(&samples.to_le_bytes());
+        chunk.bytes[WavChunk::TIME_REFERENCE].copy_from_slice(&samples.to_le_bytes());
     }
     chunk
 }

@@ -36,7 +36,10 @@ pub fn npy_header(reader: &mut impl Read, file: &str) -> Result<ArrayHeader, IoE
 }
 
 fn format(descr: &str) -> Result<PcmFormat, String> {
-    use PcmFormat::{F32Be, F32Le, F64Be, F64Le, S8, S16Be, S16Le, S32Be, S32Le, U8};
+    use PcmFormat::{
+        F16Be, F16Le, F32Be, F32Le, F64Be, F64Le, S8, S16Be, S16Le, S32Be, S32Le, S64Be, S64Le, U8, U16Be,
+        U16Le, U32Be, U32Le,
+    };
     match descr {
         "|i1" => Ok(S8),
         "|u1" => Ok(U8),
@@ -44,12 +47,23 @@ fn format(descr: &str) -> Result<PcmFormat, String> {
         ">i2" => Ok(S16Be),
         "<i4" => Ok(S32Le),
         ">i4" => Ok(S32Be),
+        "<u2" => Ok(U16Le),
+        ">u2" => Ok(U16Be),
+        "<u4" => Ok(U32Le),
+        ">u4" => Ok(U32Be),
+        "<i8" => Ok(S64Le),
+        ">i8" => Ok(S64Be),
+        "<f2" => Ok(F16Le),
+        ">f2" => Ok(F16Be),
         "<f4" => Ok(F32Le),
         ">f4" => Ok(F32Be),
         "<f8" => Ok(F64Le),
         ">f8" => Ok(F64Be),
+        "|b1" => {
+            Err("it is logical: true and false are no samples; save what they mean as numbers".to_owned())
+        }
         other => Err(format!(
-            "its numbers are {}; save i1, u1, i2, i4, f4, f8, c8 or c16, for example with x.astype(\"f4\")",
+            "its numbers are {}; save i1 to i8, u1 to u4, f2 to f8, c8 or c16, for example with x.astype(\"f4\")",
             Quoted(other)
         )),
     }
@@ -95,7 +109,8 @@ mod tests {
     #[test]
     fn what_is_no_capture_is_refused_with_the_reason() {
         for (descr, shape, part) in [
-            ("<i8", "(9,)", "its numbers are <i8"),
+            ("<u8", "(9,)", "its numbers are <u8"),
+            ("|b1", "(9,)", "it is logical"),
             ("<f4", "(2, 3, 4)", "3 axes"),
             ("<f4", "()", "0 axes"),
             ("<f4", "(0, 7)", "0 channels"),

@@ -75,6 +75,8 @@ pub(super) struct InputSource {
     pub(super) per_frame: usize,
     /// The only channel to read, from 0.
     pub(super) only: Option<usize>,
+    /// Pairs of channels are complex samples.
+    pub(super) is_iq: bool,
     /// What is said of its full scale.
     pub(super) scale: StatedScale,
     /// Bytes of a block.
@@ -89,6 +91,11 @@ impl InputSource {
 
     pub(super) fn is_stdin(&self) -> bool {
         self.path.as_os_str() == "-"
+    }
+
+    /// True for inputs whose floats may be codes of a converter.
+    pub(super) fn is_table_or_array(&self) -> bool {
+        matches!(Kind::of(&self.path, self.coding), Kind::Csv | Kind::Npy | Kind::Mat)
     }
 
     /// Samples in a row that are a frame: one of each time-interleaved converter.
@@ -141,6 +148,12 @@ const EXTRACT: &str = "it is an archive; extract the recording with tar -xf and 
 
 /// Why a recording that must be decoded is not read.
 fn decode(path: &Path) -> String {
+    let is_aiff = path
+        .extension()
+        .is_some_and(|ending| ending.to_ascii_lowercase().to_string_lossy().starts_with("aif"));
+    if is_aiff {
+        return format!("AIFF is not read; convert it: ffmpeg -i {0} -c:a pcm_f32le {0}.wav", Quoted(path));
+    }
     let flac = if cfg!(feature = "flac") { "" } else { "FLAC with the feature flac, " };
     format!(
         "hybank does not decode it: lossy formats do not keep time to the picosecond; give PCM ({flac}WAV, or a \
@@ -212,6 +225,7 @@ mod tests {
                 interleaving: None,
                 per_frame: 1,
                 only: None,
+                is_iq: false,
                 scale: StatedScale::default(),
                 block: 4096,
             };

@@ -26,6 +26,8 @@ pub struct ReadOptions<'a> {
     pub channels: usize,
     /// The only channel to read of each input, from 0.
     pub only: Option<usize>,
+    /// Pairs of channels are the real and the imaginary parts of complex samples (I and Q).
+    pub is_iq: bool,
     /// What is said of their full scale.
     pub scale: StatedScale,
     /// The time-interleaved converters of the only input, which has one channel then. Its frames are those
@@ -52,6 +54,7 @@ impl ReadOptions<'_> {
             coding: Coding::Wav,
             channels: 1,
             only: None,
+            is_iq: false,
             scale: StatedScale::default(),
             interleaving: None,
             samples_per_frame: &[],

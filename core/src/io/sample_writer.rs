@@ -1,6 +1,7 @@
 //! Writes one channel of samples to standard output or a FIFO, or to a file or SigMF recording that appears
 //! only when it is complete.
 
+use super::npy_writer::NpyFile;
 use super::sigmf::malformed;
 use super::wav::{WavFile, stream_header};
 use super::{IoError, OutputNotes, PcmFormat, SigmfMeta, is_pipe, is_same_rate, open_fifo, stdout_file};
@@ -14,6 +15,8 @@ use std::path::{Path, PathBuf};
 pub enum Container {
     /// A WAV header.
     Wav,
+    /// The header of a NumPy array.
+    Npy,
     /// Nothing.
     Raw,
 }
@@ -34,6 +37,7 @@ pub struct OutputHeader {
 /// The open destination.
 enum Target {
     Wav(WavFile<AtomicFile>),
+    Npy(NpyFile<AtomicFile>),
     /// Raw samples, and the metadata beside those of a SigMF recording.
     Raw {
         data: AtomicFile,
@@ -83,6 +87,14 @@ impl SampleWriter {
                     Target::Wav(WavFile::new(file, format, channels, hertz).map_err(refused())?)
                 }
             }
+            Container::Npy if is_stream => {
+                return Err(IoError::unfit(&name)(
+                    "an array states its length first, which a pipe cannot take; write WAV".into(),
+                ));
+            }
+            Container::Npy => {
+                Target::Npy(NpyFile::new(AtomicFile::create(path, replace)?, header).map_err(refused())?)
+            }
             Container::Raw if is_stream => stream_target(path, &[]).map_err(refused())?,
             Container::Raw => Target::Raw { data: AtomicFile::create(path, replace)?, meta: None },
         };
@@ -98,6 +110,7 @@ impl SampleWriter {
     pub fn unfinished(&mut self) -> impl Iterator<Item = &mut AtomicFile> {
         let files = match &mut self.target {
             Target::Wav(file) => [Some(file.inner_mut()), None],
+            Target::Npy(file) => [Some(file.inner_mut()), None],
             Target::Raw { data, meta } => [Some(data), meta.as_mut()],
             Target::Stream(_) => [None, None],
         };
@@ -120,6 +133,7 @@ impl SampleWriter {
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), IoError> {
         let written = match &mut self.target {
             Target::Wav(file) => file.write_bytes(bytes),
+            Target::Npy(file) => file.write_bytes(bytes),
             Target::Raw { data, .. } => data.write_all(bytes),
             Target::Stream(stream) => stream.write_all(bytes),
         };
@@ -140,6 +154,7 @@ impl SampleWriter {
         let refused = IoError::system(&self.name, "write it");
         match self.target {
             Target::Wav(file) => Ok(vec![file.finish(&self.notes.chunks).map_err(refused)?]),
+            Target::Npy(file) => Ok(vec![file.finish().map_err(refused)?]),
             Target::Stream(mut stream) => stream.flush().map(|()| Vec::new()).map_err(refused),
             Target::Raw { data, meta: None } => Ok(vec![data]),
             Target::Raw { data, meta: Some(mut meta) } => {

@@ -100,7 +100,7 @@ pub struct SigmfCapture {
     /// Number of its first frame at the converter, which counts lost frames too.
     #[serde(rename = "core:global_index", default, skip_serializing_if = "Option::is_none")]
     pub global_index: Option<u64>,
-    /// Bytes before the capture's first frame that are not samples; only 0 is read.
+    /// Bytes before the capture's first frame that are not samples.
     #[serde(rename = "core:header_bytes", default, skip_serializing_if = "is_zero")]
     pub header_bytes: u64,
     /// Date and time, frequency, and all other members.
@@ -143,7 +143,11 @@ impl SigmfMeta {
     /// [`IoError::Malformed`] if it is malformed, including its data type and captures.
     pub fn parse(text: &str, file: &str) -> Result<Self, IoError> {
         let fault = |problem| malformed(file, problem);
-        let meta: Self = serde_json::from_str(text).map_err(|error| fault(of_json(&error.to_string())))?;
+        let meta = serde_json::from_str(text).or_else(|error| {
+            let numbers = without_nan(text);
+            if numbers == text { Err(error) } else { serde_json::from_str(&numbers) }
+        });
+        let meta: Self = meta.map_err(|error| fault(of_json(&error.to_string())))?;
         meta.format(file)?;
         meta.timestamps(file)?;
         if meta.global.metadata_only {
@@ -217,26 +221,44 @@ impl SigmfMeta {
         Ok(StreamHeader { is_complex: self.is_complex(), rate: self.global.sample_rate, ..real })
     }
 
-    /// When the frames of the sample file were taken.
+    /// Number of the first frame that is read: that of the first capture, before which there are none.
+    pub(super) fn first_frame(&self) -> u64 {
+        self.captures.first().map_or(0, |capture| capture.sample_start).max(self.global.offset)
+    }
+
+    /// When the frames that are read were taken.
     pub(super) fn timestamps(&self, file: &str) -> Result<Timestamps, IoError> {
         let fault = |problem| malformed(file, problem);
         if !self.captures.is_sorted_by_key(|capture| capture.sample_start) {
             return Err(fault("the captures are not in the order of their core:sample_start".into()));
         }
-        if self.captures.iter().any(|capture| capture.header_bytes > 0) {
-            return Err(fault(
-                "captures with core:header_bytes hold more than samples; convert the recording to a conforming one".into(),
-            ));
-        }
-        let offset = self.global.offset;
+        let offset = self.first_frame();
         let timestamps = self.captures.iter().filter_map(|capture| {
             let frame = capture.sample_start.checked_sub(offset);
             capture.global_index.map(|index| frame.map(|frame| Timestamp { frame, index }))
         });
-        let before = || fault(format!("a capture begins before core:offset {offset}"));
+        let before = || fault(format!("a capture begins before core:offset {}", self.global.offset));
         let timestamps = timestamps.collect::<Option<Vec<_>>>().ok_or_else(before)?;
         Timestamps::new(timestamps).map_err(fault)
     }
+}
+
+/// The text with null in place of NaN and infinity, which JSON does not have, but Python writes.
+fn without_nan(text: &str) -> String {
+    let mut parts = text.split_inclusive('"');
+    let (mut is_quoted, mut kept) = (false, String::with_capacity(text.len()));
+    while let Some(part) = parts.next() {
+        match is_quoted {
+            true => kept.push_str(part),
+            false => kept.push_str(
+                &part.replace("-Infinity", "null").replace("Infinity", "null").replace("NaN", "null"),
+            ),
+        }
+        let is_escaped =
+            is_quoted && part.trim_end_matches('"').chars().rev().take_while(|c| *c == '\\').count() % 2 == 1;
+        is_quoted ^= !is_escaped;
+    }
+    kept
 }
 
 pub(super) fn malformed(file: &str, problem: String) -> IoError {
@@ -321,9 +343,9 @@ mod tests {
         let mut recording = meta("ri8", &[(10, Some(100)), (12, None), (15, Some(107))]);
         assert_eq!(
             recording.timestamps("test").unwrap(),
-            Timestamps::new(vec![timestamp(10, 100), timestamp(15, 107)]).unwrap()
+            Timestamps::new(vec![timestamp(0, 100), timestamp(5, 107)]).unwrap()
         );
-        // Sample numbers of a recording that was split count from its offset.
+        // Frames before the first capture are none of it; those of a recording that was split count from its offset.
         recording.global.offset = 10;
         assert_eq!(
             recording.timestamps("test").unwrap(),
@@ -342,13 +364,20 @@ mod tests {
         let mut recording = meta("ri8", &[(4, Some(9))]);
         recording.global.offset = 5;
         assert!(refused(recording.clone()).contains("before core:offset 5"));
-        recording.captures[0].header_bytes = 16;
         for (key, value) in [("num_channels", "0"), ("num_channels", "99999999"), ("sample_rate", "-1")] {
             let text = format!(r#"{{"global":{{"core:datatype":"ri8","core:{key}":{value}}}}}"#);
             let error = SigmfMeta::parse(&text, "test").unwrap_err().to_string();
             assert!(error.starts_with("test: ") && error.contains(key), "{error}");
         }
-        assert!(refused(recording).contains("core:header_bytes"));
+    }
+
+    #[test]
+    fn numbers_that_json_lacks_are_left_out() {
+        let text =
+            r#"{"global": {"core:datatype": "ri8", "x": NaN, "y": [-Infinity, 1], "z \" NaN": "NaN"}}"#;
+        let meta = SigmfMeta::parse(text, "test").unwrap();
+        assert!(meta.global.other["x"].is_null() && meta.global.other["z \" NaN"] == "NaN");
+        assert!(SigmfMeta::parse(r#"{"global": {"core:datatype": "ri8", "x": nan}}"#, "test").is_err());
     }
 
     #[test]

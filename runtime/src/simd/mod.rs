@@ -6,13 +6,14 @@
 //! vector     the vector trait, all that kernels know of an instruction set
 //! portable  avx2  avx512  neon      the trait for each set
 //! fir  recursion  spectra  pcm  finite  peak      the kernels
+//! flush      the mode in which denormals count as 0
 //! lanes      lane groups as the numbers of rustfft
 //! ```
 //!
 //! Each kernel is one body that is generic over the vector type, compiled once for each instruction set.
-//! `unsafe` is needed for three things only: to call such a function after the processor was asked, to load
-//! and store vectors at addresses whose bounds the safe wrapper has checked once for the whole call, and for
-//! two hints to the compiler in assembly.
+//! `unsafe` is needed for four things only: to call such a function after the processor was asked, to load
+//! and store vectors at addresses whose bounds the safe wrapper has checked once for the whole call, for
+//! two hints to the compiler in assembly, and to set the mode of denormals.
 //!
 //! What an unsafe function asks for is said at the function, its trait or the head of its file, and not
 //! again in its body. There are two preconditions. *The set is there*: a function that is generic over a
@@ -40,6 +41,7 @@ mod avx512;
 mod dispatch;
 mod finite;
 mod fir;
+mod flush;
 mod isa;
 mod lanes;
 #[cfg(target_arch = "aarch64")]
@@ -56,6 +58,7 @@ pub(crate) mod work;
 pub(crate) use dispatch::Element;
 pub(crate) use finite::{Replaced, not_finite, replace_not_finite};
 pub(crate) use fir::{FirKernel, Polyphase, Segment, Tiling};
+pub(crate) use flush::flushing;
 pub use isa::Isa;
 pub(crate) use lanes::{Lanes, Row};
 pub(crate) use pcm::{decode, encode, interleave};

@@ -21,6 +21,7 @@ fn reader(
         interleaving: None,
         per_frame: 1,
         only: None,
+        is_iq: false,
         scale: StatedScale::default(),
         block: 4,
     }

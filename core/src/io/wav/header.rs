@@ -34,6 +34,15 @@ impl WavChunk {
         NOTES.contains(&id) && size <= LONGEST_NOTE && has_room
     }
 
+    /// Where the Broadcast Wave chunk counts the samples since midnight (EBU Tech 3285).
+    pub(in crate::io) const TIME_REFERENCE: std::ops::Range<usize> = 338..346;
+
+    /// Samples from midnight to the first sample, if this is a Broadcast Wave chunk.
+    pub(in crate::io) fn time_reference(&self) -> Option<u64> {
+        let field = self.bytes.get(Self::TIME_REFERENCE).filter(|_| &self.id == b"bext")?;
+        field.try_into().map(u64::from_le_bytes).ok()
+    }
+
     /// The chunk, unless it is a list of something else.
     pub(super) fn new(id: [u8; 4], bytes: Vec<u8>) -> Option<Self> {
         (&id != b"LIST" || bytes.starts_with(b"INFO")).then_some(Self { id, bytes })

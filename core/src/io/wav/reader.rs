@@ -41,10 +41,14 @@ impl<R: Read> Read for WavReader<R> {
 
 impl<R: Read> ByteSource for WavReader<R> {
     fn stream_header(&self) -> StreamHeader {
+        let rate = f64::from(self.header.rate);
+        let begin =
+            self.header.chunks.iter().find_map(WavChunk::time_reference).map(|samples| samples as f64 / rate);
         let WavHeader { layout, channels, rate, data_bytes, valid_bits, .. } = self.header;
         let promised = data_bytes.map(|bytes| bytes / self.header.frame_bytes() as u64);
         StreamHeader {
             promised,
+            begin,
             is_scaled: true,
             valid_bits: Some(valid_bits.into()),
             ..StreamHeader::real(layout, channels).at_whole_hertz(rate)
