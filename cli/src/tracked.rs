@@ -1,4 +1,4 @@
-//! `fuse --track`: delays that change, from a table.
+//! `fuse --track` and `fuse --stamps`: delays that change, from a table, and samples with stamps of their own.
 
 use super::capture_file::unread;
 use super::print::{Failure, check_strict, failed, failed_at, is_dash, print, print_report, warn};
@@ -7,8 +7,8 @@ use super::written::{Mono, begin_recording};
 use hybank::bank::Bank;
 use hybank::captures::Captures;
 use hybank::files::{Bound, commit_all, read_text};
-use hybank::io::{MultiReader, read_stamped};
-use hybank::merge::{DelayTrack, MergeError, Tracked, fuse_tracked};
+use hybank::io::{MultiReader, StatedScale, read_stamped};
+use hybank::merge::{DelayTrack, MergeError, Tracked, fuse_stamped, fuse_tracked};
 use hybank::messages::{Quoted, counted};
 use hybank::quantity::readable;
 use hybank::units::Seconds;
@@ -30,12 +30,19 @@ pub(super) struct TrackArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all =
           ["bit_true", "algorithm", "gaps", "keep_latency", "measure", "report", "interleaved", "threads"])]
     track: Option<PathBuf>,
+    /// Each capture is a table (.csv) whose first column says when its samples were taken: taps are made for
+    /// these instants in place of the delays of the spec
+    #[arg(long, conflicts_with_all = ["track", "bit_true", "algorithm", "gaps", "keep_latency", "measure", "report",
+          "interleaved", "threads"])]
+    stamps: bool,
 }
 
 #[derive(Debug, serde::Serialize)]
 struct Report {
     samples: usize,
     rate: f64,
+    /// When the first sample was taken: after the first frame, or by the stamps.
+    begin: f64,
     predicted_snr_db: f64,
     worst_second_db: f64,
     /// After the first sample.
@@ -44,6 +51,11 @@ struct Report {
 }
 
 impl TrackArgs {
+    /// Whether samples have stamps.
+    pub(super) fn has_stamps(&self) -> bool {
+        self.stamps
+    }
+
     /// The table, if one is given.
     pub(super) fn file(&self) -> Option<&Path> {
         self.track.as_deref()
@@ -66,15 +78,46 @@ pub(super) fn fuse(job: &Job<'_>, table: &Path, mut reader: MultiReader) -> Resu
         MergeError::NoSamples => failed(error),
         error => failed_at(table, error),
     })?;
+    write(job, &tracked, rate, reader.warnings().iter().map(ToString::to_string).collect())
+}
+
+/// Fuses tables whose samples have stamps.
+pub(super) fn fuse_stamps(job: &Job<'_>, inputs: &[PathBuf], scale: StatedScale) -> Result<(), Failure> {
+    let (mut channels, mut stamps) = (Vec::new(), Vec::new());
+    for path in inputs {
+        let table = read_stamped(path).map_err(failed)?.ok_or_else(|| {
+            failed_at(path, "no table whose first column is a time, which --stamps needs; as `time,x` with lines of numbers")
+        })?;
+        for column in table.columns {
+            channels.push(column.into_iter().map(|x| scale.of_number(x)).collect());
+            stamps.push(table.stamps.clone());
+        }
+    }
+    let wanted = job.bank.channel_count();
+    if channels.len() != wanted {
+        let (columns, channels) = (counted(channels.len(), "column"), counted(wanted, "channel"));
+        return Err(failed_at(
+            job.bank_path,
+            format!("{channels}, but the tables have {columns} beside their times"),
+        ));
+    }
+    let tracked = fuse_stamped(job.bank, &channels, &stamps).map_err(|error| match error {
+        MergeError::Design(_) => failed_at(job.bank_path, error),
+        error => failed(error),
+    })?;
+    write(job, &tracked, 1.0 / job.bank.fast_period.0, Vec::new())
+}
+
+/// Writes what was fused, and reports it.
+fn write(job: &Job<'_>, tracked: &Tracked, rate: f64, warnings: Vec<String>) -> Result<(), Failure> {
     let samples = &tracked.samples;
     let mono = Mono { samples, imaginary: None, rate, format: job.format, container: job.container };
     let files = begin_recording(job.output, mono, job.args.force)?;
-    let warnings: Vec<String> =
-        reader.warnings().iter().map(ToString::to_string).chain(mono.clipped()).collect();
+    let warnings: Vec<String> = warnings.into_iter().chain(mono.clipped()).collect();
     check_strict(&warnings, job.args.strict)?;
     commit_all(files).map_err(failed)?;
     warnings.iter().for_each(|text| warn(text));
-    report(job, &tracked, rate, warnings)
+    report(job, tracked, rate, warnings)
 }
 
 /// Reads the table of delays: lines of JSON as `align` writes them, or a table with headings.
@@ -121,6 +164,7 @@ fn report(job: &Job<'_>, tracked: &Tracked, rate: f64, warnings: Vec<String>) ->
     let report = Report {
         samples: tracked.samples.len(),
         rate,
+        begin: tracked.begin.0,
         predicted_snr_db: tracked.snr.0,
         worst_second_db: tracked.worst_second.0,
         worst_second_at: tracked.worst_at.0,

@@ -36,7 +36,7 @@ def test_what_resembles_an_array_gives_the_same_bits(fir, random):
         assert_identical(fir.fuse(same), want)
     rows = np.broadcast_to(x[0], (2, 64))
     np.testing.assert_array_equal(fir.fuse(rows), fir.fuse(rows.copy()))
-    assert_identical(fir.fuse([[1, 2], [3, 4]]), fir.fuse([[1.0, 2.0], [3.0, 4.0]]))
+    assert_identical(fir.fuse([[1, 2], [3, 4]]), fir.fuse(np.array([[1, 2], [3, 4]], "i8")))
 
 
 def test_half_precision_is_read_exactly(fir, random):
@@ -78,7 +78,7 @@ def test_huge_values_and_nan_stay_where_they_are(fir, iir):
     assert report.replaced == 20 and not y.any()
 
 
-@pytest.mark.parametrize("dtype", ["i8", "u2", "?", "g", "M8[s]", "U3"])
+@pytest.mark.parametrize("dtype", ["u8", "?", "g", "M8[s]", "U3"])
 def test_other_number_types_are_refused_with_the_ones_that_are_read(fir, dtype):
     with pytest.raises(hb.HybankError, match=r"convert them to float32, .* complex128"):
         fir.fuse(np.zeros((2, 4), dtype))

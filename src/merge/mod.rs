@@ -10,7 +10,7 @@ mod error;
 mod tracked;
 
 pub use error::{MergeError, MergeWarning};
-pub use tracked::{DelayTrack, Tracked, fuse_tracked};
+pub use tracked::{DelayTrack, Tracked, fuse_stamped, fuse_tracked};
 
 use crate::align::Step;
 use crate::calibrate::Record;

@@ -19,8 +19,10 @@ pub struct DelayTrack {
 /// The fused recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracked {
-    /// M for each frame; the first one is at the time of the first frame.
+    /// At the fast rate.
     pub samples: Vec<f64>,
+    /// The time of the first one: of the first frame, or by the stamps.
+    pub begin: Seconds,
     /// The predicted signal-to-noise ratio away from the ends, for a signal that is flat over the band.
     pub snr: Decibels,
     /// Of the worst second.
@@ -49,17 +51,59 @@ pub fn fuse_tracked(bank: &Bank, channels: &[Vec<f64>], track: &DelayTrack) -> R
     if count == 0 {
         return Err(MergeError::NoSamples);
     }
-    check_memory(count)?;
-    let recording = |(i, samples): (usize, &Vec<f64>)| {
-        let own = samples.iter().map(|x| x - bank.offsets[i]).collect();
-        Ok(Recording::new(own, clock(bank, track, i)?, i))
+    let clocks: Vec<Clock> =
+        (0..channels.len()).map(|i| clock(bank, track, i)).collect::<Result<_, MergeError>>()?;
+    fused(bank, channels, clocks, FusionSettings { first: FastPeriods(0.0), count, reach: REACH })
+}
+
+/// Fuses the recordings of the converters of a bank, each sample of which has its time stamp; NaN where
+/// samples were lost. Front ends, band and noise are those of the bank's spec, its delays are not used. The
+/// outputs lie on fast periods after the first stamp of the first converter, as far as all converters reach.
+///
+/// # Errors
+/// [`MergeError`]: for a bank without a spec or a band, for stamps that do not ascend or have no time in
+/// common.
+pub fn fuse_stamped(
+    bank: &Bank,
+    channels: &[Vec<f64>],
+    stamps: &[Vec<Seconds>],
+) -> Result<Tracked, MergeError> {
+    let origin = stamps.first().and_then(|own| own.first()).copied().ok_or(MergeError::NoSamples)?;
+    let clock = |(i, own): (usize, &Vec<Seconds>)| {
+        let instants: Vec<FastPeriods> =
+            own.iter().map(|stamp| (*stamp - origin).in_fast_periods(bank.fast_period)).collect();
+        let name = format!("channel {}", i + 1);
+        Clock::stamps(&instants).map_err(|problem| MergeError::Stamps { name, problem })
     };
-    let recordings: Vec<Recording> =
-        channels.iter().enumerate().map(recording).collect::<Result<_, MergeError>>()?;
-    let settings = FusionSettings { first: FastPeriods(0.0), count, reach: REACH };
+    let clocks: Vec<Clock> = stamps.iter().enumerate().map(clock).collect::<Result<_, _>>()?;
+    let last = |(clock, samples): (&Clock, &Vec<f64>)| clock.at(samples.len().saturating_sub(1) as f64).0;
+    let begin = clocks.iter().map(|clock| clock.at(0.0).0).fold(0.0, f64::max).ceil();
+    let end = clocks.iter().zip(channels).map(last).fold(f64::INFINITY, f64::min).floor();
+    let longest = channels.iter().map(Vec::len).max().unwrap_or(0);
+    if end < begin {
+        let seconds = bank.fast_period.0 * (end - begin).max(0.0);
+        return Err(MergeError::Overlap { seconds, samples: longest });
+    }
+    let count = (end - begin) as usize + 1;
+    let tracked =
+        fused(bank, channels, clocks, FusionSettings { first: FastPeriods(begin), count, reach: REACH })?;
+    Ok(Tracked { begin: origin + bank.fast_period * begin, ..tracked })
+}
+
+/// The outputs from samples at the instants of clocks.
+fn fused(
+    bank: &Bank,
+    channels: &[Vec<f64>],
+    clocks: Vec<Clock>,
+    settings: FusionSettings,
+) -> Result<Tracked, MergeError> {
+    check_memory(settings.count)?;
+    let recording = |((i, samples), clock): ((usize, &Vec<f64>), Clock)| {
+        Recording::new(samples.iter().map(|x| x - bank.offsets[i]).collect(), clock, i)
+    };
+    let recordings: Vec<Recording> = channels.iter().enumerate().zip(clocks).map(recording).collect();
     let estimator = design::instants_estimator(bank, settings.longest(&recordings))?;
-    let fused = fuse(&estimator, &recordings, settings)?;
-    Ok(judged(fused, bank))
+    Ok(judged(fuse(&estimator, &recordings, settings)?, bank))
 }
 
 /// When a converter takes its samples: sample k at kM - D.
@@ -93,6 +137,7 @@ fn judged(fused: Fused, bank: &Bank) -> Tracked {
         worst_second: ratio(worst.mean),
         worst_at: Seconds((ends + worst.first) as f64 * block.0),
         samples: fused.samples,
+        begin: Seconds(0.0),
     }
 }
 
@@ -157,6 +202,34 @@ mod tests {
         // Tones are no flat spectrum.
         assert!((snr - tracked.snr.0).abs() < 6.0, "{snr} measured, {} predicted", tracked.snr);
         assert!(snr > 60.0 && tracked.worst_second.0 <= tracked.snr.0 + 1e-9, "{snr}");
+    }
+
+    /// The stamps of each converter jitter by a tenth of its period, and it loses samples.
+    #[test]
+    fn samples_with_stamps_of_their_own_are_fused() {
+        let (bank, mut random) = (bank(), crate::random::Random(3));
+        let mut stamped = |gain: f64, late: f64| {
+            let stamps: Vec<Seconds> = (0..6000)
+                .map(|k| Seconds(7.0 + (k as f64 + late + 0.2 * random.sample()) / 24_000.0))
+                .collect();
+            let samples: Vec<f64> = stamps.iter().map(|t| rounded(gain * value(t.0))).collect();
+            (stamps, samples)
+        };
+        let (first, second) = (stamped(1.0, 0.0), stamped(-0.6, 0.45));
+        let mut channels = [first.1, second.1];
+        channels[1][3000] = f64::NAN;
+        let tracked = fuse_stamped(&bank, &channels, &[first.0, second.0]).unwrap();
+        let (mut error, mut power) = (0.0, 0.0);
+        for (n, y) in tracked.samples.iter().enumerate().take(11_000).skip(200) {
+            let truth = value(tracked.begin.0 + n as f64 / 48_000.0);
+            error += (y - truth).powi(2);
+            power += truth * truth;
+        }
+        let snr = 10.0 * (power / error).log10();
+        assert!(snr > 45.0 && (snr - tracked.snr.0).abs() < 8.0, "{snr} measured, {} predicted", tracked.snr);
+        let apart = [vec![Seconds(0.0), Seconds(1.0)], vec![Seconds(5.0), Seconds(6.0)]];
+        let refused = fuse_stamped(&bank, &[vec![0.0; 2], vec![0.0; 2]], &apart).unwrap_err();
+        assert!(refused.to_string().contains("in common"), "{refused}");
     }
 
     #[test]

@@ -16,6 +16,7 @@ mod converter_errors;
 mod cuts;
 mod design;
 mod docs;
+mod doors;
 mod examples;
 #[cfg(target_os = "linux")]
 mod export;

@@ -102,7 +102,7 @@ fn names_of_outputs_say_what_is_in_them() {
     for (name, part) in [
         ("out.flac", "sox -t wav - out.flac"),
         ("out.MP3", "not mp3"),
-        ("out.npy", "name it out.wav"),
+        ("out.npz", "name it out.wav"),
         ("out.raw", "hybank stream"),
         ("out.sigmf", "name it out.sigmf-meta"),
         ("out.sigmf-data", "name it out.sigmf-meta"),

@@ -41,6 +41,11 @@ impl StatedScale {
         self.given.or(of_spec).map(|scale| (scale, true)).or(of_header)
     }
 
+    /// A number of a table, of full scale 1.
+    pub fn of_number(self, x: f64) -> f64 {
+        self.given.or(self.of_spec).map_or(x, |scale| (x - scale.middle()) / scale.amplitude())
+    }
+
     /// True if samples stored so have another full scale than 1.
     pub fn changes(self, header: &StreamHeader) -> bool {
         self.of(header).is_some()
@@ -348,10 +353,13 @@ impl Seen {
         let (low, high) = (T::from_f64(self.rails.0), T::from_f64(self.rails.1));
         let zero = T::from_f64(0.0);
         // Comparisons leave NaN out.
-        let least = numbers.iter().fold(zero, |least, &x| if x < least { x } else { least });
-        let most = numbers.iter().fold(zero, |most, &x| if x > most { x } else { most });
+        let mut least = numbers.iter().fold(zero, |least, &x| if x < least { x } else { least });
+        let mut most = numbers.iter().fold(zero, |most, &x| if x > most { x } else { most });
         if least <= low || most >= high {
-            self.at_rails += numbers.iter().filter(|x| **x <= low || **x >= high).count() as u64;
+            let finite = || numbers.iter().copied().filter(|x| x.to_f64().is_finite());
+            self.at_rails += finite().filter(|x| *x <= low || *x >= high).count() as u64;
+            least = finite().fold(zero, |least, x| if x < least { x } else { least });
+            most = finite().fold(zero, |most, x| if x > most { x } else { most });
         }
         self.least = self.least.min(least.to_f64());
         self.most = self.most.max(most.to_f64());

@@ -3,6 +3,9 @@
 use crate::support::{Desk, bytes, wav};
 use serde_json::json;
 
+/// So that no sample is beyond full scale.
+const STEP: f32 = 1.0 / 524_288.0;
+
 /// A bank of three converters with the delays 0, 2 and 1 of a slow period of 3, whose channels go unchanged
 /// to the phases: they sample in the order channel 2, 3, 1.
 fn write_bank(desk: &Desk, delays: [f64; 3]) {
@@ -24,14 +27,14 @@ fn write_bank(desk: &Desk, delays: [f64; 3]) {
     desk.write("three.json", bank.to_string());
 }
 
-/// Sample k of the capture is k.
+/// Sample k of the capture is k steps.
 fn capture(turns: usize) -> Vec<f32> {
-    (0..3 * turns).map(|k| k as f32).collect()
+    (0..3 * turns).map(|k| STEP * k as f32).collect()
 }
 
 /// The capture with each turn in the order of the channels.
 fn by_channel(turns: usize) -> Vec<f32> {
-    (0..turns).flat_map(|turn| [2, 0, 1].map(|j| (3 * turn + j) as f32)).collect()
+    (0..turns).flat_map(|turn| [2, 0, 1].map(|j| STEP * (3 * turn + j) as f32)).collect()
 }
 
 #[test]
