@@ -3,7 +3,7 @@
 use super::sigmf::SigmfMeta;
 use super::timestamps::Timestamps;
 use super::wav::WavChunk;
-use super::{IoError, StreamHeader};
+use super::{InputFault, IoError, StreamHeader};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -21,6 +21,11 @@ pub(super) trait Capture: Read {
     /// What it says besides its samples.
     fn notes(&self) -> InputNotes {
         InputNotes::default()
+    }
+
+    /// What else was tolerated; known at the end.
+    fn faults(&self) -> Vec<InputFault> {
+        Vec::new()
     }
 
     /// Bytes of further samples, which are not read; known after [`Capture::chunks_after`].
@@ -75,11 +80,6 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Begins with a block that is there.
-    pub(super) fn new(bytes: Vec<u8>) -> Self {
-        Self { bytes, given: 0 }
-    }
-
     /// Reads on; `refill` puts the next block into an empty vector, and leaves it empty at the end.
     pub(super) fn read<E: Into<io::Error>>(
         &mut self,

@@ -112,7 +112,8 @@ impl InputFrames {
         let further = (bytes > 0).then_some(InputFault::FurtherSamples { bytes });
         let scale = self.scaling.as_ref().and_then(Scaling::fault);
         let altered = self.frames.inner.is_altered().then_some(InputFault::Altered);
-        truncated.into_iter().chain(cut).chain(further).chain(scale).chain(altered).collect()
+        let own = self.frames.inner.faults();
+        own.into_iter().chain(truncated).chain(cut).chain(further).chain(scale).chain(altered).collect()
     }
 }
 

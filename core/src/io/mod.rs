@@ -28,7 +28,6 @@
 mod aligned_input;
 mod array;
 mod capture;
-mod csv;
 mod error;
 #[cfg(feature = "flac")]
 mod flac;
@@ -52,7 +51,6 @@ mod sample_writer;
 mod sigmf;
 mod sigmf_reader;
 mod stall;
-mod stamped;
 mod stream_header;
 pub mod table;
 mod timestamps;
@@ -60,7 +58,6 @@ pub mod wav;
 
 pub use crate::runtime::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
 pub use array::{ArrayHeader, ArrayReader};
-pub use csv::CsvReader;
 pub use error::{InputFault, InputWarning, IoError};
 pub use frame_file::FrameFile;
 pub use lost::LostSamples;
@@ -76,6 +73,5 @@ pub use read_options::{BLOCK_BYTES, ReadOptions, TimeInterleaving, Until};
 pub use sample_writer::{Container, OutputHeader, SampleWriter};
 pub use sigmf::{SigmfAnnotation, SigmfCapture, SigmfGlobal, SigmfMeta, is_sigmf, sigmf_files};
 pub use stall::{OnStall, Stall};
-pub use stamped::{StampedTable, read_stamped};
 pub use stream_header::{Coding, StreamHeader, is_same_rate};
 pub use timestamps::{MAX_LOST, MAX_LOST_AT_ONCE};

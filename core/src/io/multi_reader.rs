@@ -78,6 +78,7 @@ impl MultiReader {
             channels: options.channels,
             only: options.only,
             full_scale: options.full_scale,
+            table: options.table.clone(),
             interleaving: interleaving.cloned(),
             per_frame: options.samples_per_frame.get(i).copied().unwrap_or(1),
             block,

@@ -1,13 +1,12 @@
 //! Opens inputs of every kind.
 
 use super::capture::{Capture, open_file};
-use super::csv::CsvReader;
 use super::mat::{mat_variable, open_mat};
 use super::npy::open_npy;
 use super::pipe::{stdin_file, widen_pipe};
 use super::sigmf::is_sigmf;
 use super::sigmf_reader::SigmfReader;
-use super::table::is_table;
+use super::table::{TableOptions, TableReader, is_table};
 use super::wav::WavReader;
 use super::{Coding, IoError, PcmFormat, SampleLayout, StreamHeader, TimeInterleaving};
 use crate::messages::Quoted;
@@ -77,6 +76,8 @@ pub(super) struct InputSource {
     pub(super) only: Option<usize>,
     /// Full scale, if the format does not say it.
     pub(super) full_scale: Option<FullScale>,
+    /// How it is read if it is a table.
+    pub(super) table: TableOptions,
     /// Bytes of a block.
     pub(super) block: usize,
 }
@@ -111,7 +112,7 @@ impl InputSource {
         Ok(match Kind::of(path, self.coding) {
             Kind::Sigmf => Box::new(SigmfReader::open(path)?),
             Kind::Archive => return Err(unread(path, EXTRACT)),
-            Kind::Csv => Box::new(CsvReader::new(self.stream()?, &name)?),
+            Kind::Csv => Box::new(TableReader::new(self.stream()?, &name, &self.table)?),
             Kind::Npy => Box::new(open_npy(open_file(path)?, &name)?),
             Kind::Mat => {
                 let (file, variable) = mat_variable(path).unwrap_or_else(|| (path.to_owned(), None));
@@ -214,6 +215,7 @@ mod tests {
                 per_frame: 1,
                 only: None,
                 full_scale: None,
+                table: TableOptions::default(),
                 block: 4096,
             };
             io::copy(&mut source.open().unwrap(), &mut io::sink())

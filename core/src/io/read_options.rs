@@ -1,6 +1,7 @@
 //! Settings of the reading of several inputs.
 
 use super::timestamps::MAX_LOST;
+use super::table::TableOptions;
 use super::{Coding, LostSamples};
 use crate::quantity::FullScale;
 
@@ -18,7 +19,7 @@ pub enum Until {
 }
 
 /// Settings of the reading.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct ReadOptions<'a> {
     /// Coding of all inputs except [those that state it](super::is_self_describing).
     pub coding: Coding,
@@ -28,6 +29,8 @@ pub struct ReadOptions<'a> {
     pub only: Option<usize>,
     /// Full scale of inputs whose [format does not say it](super::StreamHeader::is_scaled); 1 if `None`.
     pub full_scale: Option<FullScale>,
+    /// How tables are read.
+    pub table: TableOptions,
     /// The time-interleaved converters of the only input, which has one channel then. Its frames are those
     /// of an input of M channels, at an M-th of its rate.
     pub interleaving: Option<&'a TimeInterleaving>,
@@ -53,6 +56,7 @@ impl ReadOptions<'_> {
             channels: 1,
             only: None,
             full_scale: None,
+            table: TableOptions::default(),
             interleaving: None,
             samples_per_frame: &[],
             lost: None,

@@ -92,6 +92,8 @@ pub struct StreamHeader {
     pub promised: Option<u64>,
     /// Full scale is 1 by the format: of integers, of WAV and FLAC files.
     pub is_scaled: bool,
+    /// The first column of a table was left out as times or an index, because it is a steady ramp.
+    pub is_ramp_left_out: bool,
     /// Lowest and highest sample of integers and of codes; `None` for floats.
     pub rails: Option<(f64, f64)>,
 }
@@ -109,6 +111,7 @@ impl StreamHeader {
             begin: None,
             promised: None,
             is_scaled,
+            is_ramp_left_out: false,
             rails: is_scaled.then(|| rails(layout.format)),
         }
     }

@@ -21,6 +21,7 @@ fn reader(
         per_frame: 1,
         only: None,
         full_scale: None,
+        table: Default::default(),
         block: 4,
     }
     .raw_header();
