@@ -141,7 +141,7 @@ impl Args {
         let options = ReadOptions { full_scale: own.full_scale.or(spec.full_scale), ..own };
         let (mut records, mut formats, mut headers) = (Vec::new(), Vec::new(), Vec::new());
         for path in &self.captures {
-            let mut reader = start(std::slice::from_ref(path), options)?;
+            let mut reader = start(std::slice::from_ref(path), options.clone())?;
             self.reading.scale.check(&reader)?;
             check_rate(spec, &reader).map_err(failed)?;
             let Some(header) = reader.headers().next().map(|(_, header)| *header) else { continue };

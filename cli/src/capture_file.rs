@@ -20,7 +20,7 @@ pub(super) struct CaptureFile {
 }
 
 /// How a recording is read.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Reading {
     /// Format and channel; a mono recording needs no channel.
     pub(super) options: ReadOptions<'static>,
@@ -43,8 +43,9 @@ impl Reading {
 impl CaptureFile {
     /// Reads a recording; `-` is standard input.
     pub(super) fn read(path: &Path, reading: Reading) -> Result<Self, Failure> {
+        let full_scale = reading.options.full_scale;
         let mut reader = start(&[path.to_owned()], reading.options)?;
-        check_scale(reading.options.full_scale, &reader)?;
+        check_scale(full_scale, &reader)?;
         Captures::check_mono(&reader).map_err(unread)?;
         if !reading.takes_complex {
             check_real(&reader).map_err(failed)?;

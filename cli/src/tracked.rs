@@ -7,7 +7,8 @@ use super::written::{Mono, begin_recording};
 use hybank::bank::Bank;
 use hybank::captures::Captures;
 use hybank::files::{Bound, commit_all, read_text};
-use hybank::io::{MultiReader, read_stamped};
+use hybank::io::MultiReader;
+use hybank::io::table::{TableOptions, read_stamped};
 use hybank::merge::{DelayTrack, MergeError, Tracked, fuse_tracked};
 use hybank::messages::{Quoted, counted};
 use hybank::quantity::readable;
@@ -82,7 +83,7 @@ fn read(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("jsonl")) {
         return read_lines(path, bank);
     }
-    let table = read_stamped(path).map_err(failed)?.ok_or_else(|| {
+    let table = read_stamped(path, &TableOptions::default()).map_err(failed)?.ok_or_else(|| {
         failed_at(
             path,
             "no table of delays: its first line has no headings of which the first is a time, as `time,delay 1,delay 2`",

@@ -4,6 +4,7 @@ use crate::bank::Bank;
 use crate::errors::{capture_error, io_error, refused, warn};
 use crate::sources;
 use hybank::captures::{CaptureError, Captures, ChannelSamples, Converters, FileFormat};
+use hybank::io::table::{TableOptions, TimeColumn};
 use hybank::io::{LostSamples, MAX_LOST, MultiReader, ReadOptions, TimeInterleaving, Until};
 use hybank::pipeline::matching;
 use hybank::quantity::{self, FullScale};
@@ -11,6 +12,7 @@ use numpy::{Complex64, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 /// Samples of a channel that are read at most: an array of more is 32 GiB.
 const MOST: usize = 1 << 32;
@@ -27,6 +29,11 @@ pub(crate) struct Options {
     lost: Option<PathBuf>,
     max_lost: Option<u64>,
     longest: bool,
+    skip_lines: u64,
+    columns: Vec<String>,
+    time_column: Option<String>,
+    delimiter: Option<String>,
+    decimal: Option<String>,
 }
 
 /// What `work` makes of the converters of a bank, or of a spec.
@@ -108,8 +115,29 @@ impl Options {
             channels: self.channels,
             only: self.channel.map(|channel| channel.saturating_sub(1)),
             full_scale: full_scale(self.full_scale.as_deref())?,
+            table: self.table()?,
         })
     }
+}
+
+impl Options {
+    fn table(&self) -> PyResult<TableOptions> {
+        let columns = self.columns.iter().map(|column| parsed("columns", column));
+        let time = self.time_column.as_deref().map(|column| parsed("time_column", column)).transpose()?;
+        Ok(TableOptions {
+            skip_lines: self.skip_lines,
+            columns: columns.collect::<PyResult<_>>()?,
+            time: time.unwrap_or(TimeColumn::Found),
+            delimiter: self.delimiter.as_deref().map(|text| parsed("delimiter", text)).transpose()?,
+            decimal: self.decimal.as_deref().map(|text| parsed("decimal", text)).transpose()?,
+            ..TableOptions::default()
+        })
+    }
+}
+
+/// What the text given as `name` means.
+fn parsed<T: FromStr<Err = String>>(name: &str, text: &str) -> PyResult<T> {
+    text.parse().map_err(|problem| refused(format!("{name}: {text:?}: {problem}")))
 }
 
 fn full_scale(given: Option<&str>) -> PyResult<Option<FullScale>> {

@@ -1,6 +1,7 @@
 //! Of which converters captures come, and how their files are read.
 
 use crate::bank::{Bank, FrameLayout};
+use crate::io::table::TableOptions;
 use crate::io::{Coding, MultiReader, ReadOptions, TimeInterleaving};
 use crate::pipeline::matching::{self, InputMismatch, NotInTurn};
 use crate::quantity::FullScale;
@@ -8,7 +9,7 @@ use crate::spec::Spec;
 use crate::units::FastPeriods;
 
 /// What is said of files that do not state their format.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct FileFormat {
     /// The coding of the samples.
     pub coding: Coding,
@@ -18,15 +19,17 @@ pub struct FileFormat {
     pub only: Option<usize>,
     /// Full scale of files whose format does not say it.
     pub full_scale: Option<FullScale>,
+    /// How tables are read.
+    pub table: TableOptions,
 }
 
 impl FileFormat {
     /// Of so many files that together have `channels` channels.
     pub fn options(self, files: usize, channels: usize) -> ReadOptions<'static> {
-        let Self { coding, only, full_scale, .. } = self;
+        let Self { coding, only, full_scale, table, .. } = self;
         let usual = if files == 1 && only.is_none() { channels } else { 1 };
         let channels = self.channels.unwrap_or(usual);
-        ReadOptions { coding, channels, only, full_scale, ..ReadOptions::files() }
+        ReadOptions { coding, channels, only, full_scale, table, ..ReadOptions::files() }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Settings of the reading of several inputs.
 
-use super::timestamps::MAX_LOST;
 use super::table::TableOptions;
+use super::timestamps::MAX_LOST;
 use super::{Coding, LostSamples};
 use crate::quantity::FullScale;
 

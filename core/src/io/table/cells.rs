@@ -114,7 +114,9 @@ fn whole(cell: &str) -> Option<f64> {
 
 fn parse(cell: &str) -> Option<f64> {
     match cell.parse::<f64>() {
-        Ok(number) if number.is_finite() && !(SCPI_INFINITY..SCPI_MOST).contains(&number.abs()) => Some(number),
+        Ok(number) if number.is_finite() && !(SCPI_INFINITY..SCPI_MOST).contains(&number.abs()) => {
+            Some(number)
+        }
         Ok(_) => Some(f64::NAN),
         Err(_) => is_missing(cell).then_some(f64::NAN),
     }
@@ -160,7 +162,9 @@ mod tests {
 
     #[test]
     fn missing_samples_have_many_names() {
-        for cell in ["", "NaN", "-nan", "inf", "-Infinity", "-", "N/A", "Overload", "9.91E+37", "-9.9e37", "∞"] {
+        for cell in
+            ["", "NaN", "-nan", "inf", "-Infinity", "-", "N/A", "Overload", "9.91E+37", "-9.9e37", "∞"]
+        {
             assert!(read(&[cell])[0].is_some_and(f64::is_nan), "{cell}");
         }
         for cell in ["x", "1 V", "missing", "0x1f", "1e37 ", "--1"] {

@@ -49,7 +49,9 @@ impl Unsteady {
                 time(digit),
                 time(step)
             ),
-            Self::Doubled => "it has the time of the line before; leave out what was written twice".to_owned(),
+            Self::Doubled => {
+                "it has the time of the line before; leave out what was written twice".to_owned()
+            }
             Self::Back { by } => format!(
                 "its time is {} before that of the line before, so the lines are not sorted; sort the lines by their times",
                 time(by)
@@ -209,11 +211,6 @@ impl Clock {
     pub(super) fn step_error(&self) -> f64 {
         self.error / self.steps.max(1) as f64
     }
-
-    /// How many steps after the first stamp the last one is.
-    pub(super) fn steps(&self) -> u64 {
-        self.steps
-    }
 }
 
 #[cfg(test)]
@@ -227,7 +224,7 @@ mod tests {
         for (k, stamp) in stamps.iter().enumerate().skip(64) {
             missing.push(clock.take(*stamp).map_err(|fault| (k, fault))?);
         }
-        assert_eq!(clock.steps(), stamps.len() as u64 - 1 + missing.iter().sum::<u64>());
+        assert_eq!(clock.steps, stamps.len() as u64 - 1 + missing.iter().sum::<u64>());
         Ok((clock.step(), clock.step_error(), missing.iter().sum()))
     }
 
@@ -254,7 +251,8 @@ mod tests {
             // Truncated.
             texts(20_000, |k| format!("{:.6}", (k * step * 1e6).floor() / 1e6)),
         ] {
-            let (found, error, missing) = judged(&lines).unwrap_or_else(|(k, fault)| panic!("{k} {} {fault:?}", lines[k]));
+            let (found, error, missing) =
+                judged(&lines).unwrap_or_else(|(k, fault)| panic!("{k} {} {fault:?}", lines[k]));
             assert!((found - step).abs() <= error && error < 1e-4 * step, "{found} {error}");
             assert_eq!(missing, 0);
         }

@@ -171,8 +171,13 @@ impl<R: Read> Table<R> {
 
     /// The columns that hold something, or those that the options choose.
     pub fn columns(&self) -> Vec<usize> {
-        let held = (0..self.width()).filter(|&column| !self.preamble.blank[column] && self.preamble.layout.time != Some(column));
-        if self.preamble.layout.chosen.is_empty() { held.collect() } else { self.preamble.layout.chosen.clone() }
+        let held = (0..self.width())
+            .filter(|&column| !self.preamble.blank[column] && self.preamble.layout.time != Some(column));
+        if self.preamble.layout.chosen.is_empty() {
+            held.collect()
+        } else {
+            self.preamble.layout.chosen.clone()
+        }
     }
 
     /// A cell of the last line.

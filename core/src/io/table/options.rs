@@ -16,6 +16,8 @@ pub struct TableOptions {
     pub columns: Vec<Column>,
     /// The column that says when each line was taken.
     pub time: TimeColumn,
+    /// The rate is known from elsewhere: the times are left out without being judged.
+    pub is_rate_known: bool,
 }
 
 /// A column of a table. It reads from its number, counted from 1, or its heading.

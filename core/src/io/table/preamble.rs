@@ -66,7 +66,9 @@ impl Preamble {
             };
             let mut ahead = VecDeque::from([line]);
             // A line at hand tells whether the numbers are part of the preamble.
-            if lines.is_more_at_hand() && let Some(next) = lines.next()?.map(<[u8]>::to_vec) {
+            if lines.is_more_at_hand()
+                && let Some(next) = lines.next()?.map(<[u8]>::to_vec)
+            {
                 let is_headings = is_headings(&next, &ahead[0].1, layout.delimiter);
                 ahead.push_back((lines.number, next));
                 if is_headings {
@@ -122,7 +124,8 @@ impl Preamble {
 
 /// What is said of a table in which no numbers were found.
 fn no_numbers(lines: usize, options: &TableOptions) -> String {
-    let names: Vec<String> = options.columns.iter().filter(|column| is_name(column)).map(Column::to_string).collect();
+    let names: Vec<String> =
+        options.columns.iter().filter(|column| is_name(column)).map(Column::to_string).collect();
     let named = match names.as_slice() {
         [] => String::new(),
         names => format!(" in columns called {}", Quoted(names.join(", "))),
@@ -209,7 +212,8 @@ fn is_headings(line: &[u8], before: &[u8], delimiter: Delimiter) -> bool {
     if cells.is_empty() || line.starts_with(b"#") {
         return false;
     }
-    let is_word = |cell: &String| Numbers { decimal: None }.read(cell).is_none() && Stamp::parse(cell).is_none();
+    let is_word =
+        |cell: &String| Numbers { decimal: None }.read(cell).is_none() && Stamp::parse(cell).is_none();
     cells.len() != split(before, delimiter).len() && cells.iter().all(is_word)
 }
 

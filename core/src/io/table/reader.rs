@@ -47,6 +47,7 @@ pub struct TableReader<R> {
     missing: u64,
     all_missing: u64,
     other_rate: Option<InputFault>,
+    is_rate_known: bool,
     /// The next frames.
     blocks: Blocks,
 }
@@ -88,6 +89,7 @@ impl<R: Read> TableReader<R> {
             missing: 0,
             all_missing: 0,
             other_rate: None,
+            is_rate_known: options.is_rate_known,
             blocks: Blocks::default(),
         };
         reader.look_ahead(candidate)?;
@@ -145,7 +147,7 @@ impl<R: Read> TableReader<R> {
     fn time_by(&mut self, time: Candidate, lines: &[u64]) -> Result<(), IoError> {
         let unit = time.unit();
         self.header.begin = time.stamps.first().zip(unit).map(|(first, unit)| first.value() * unit);
-        if time.stamps.len() < 2 {
+        if time.stamps.len() < 2 || self.is_rate_known {
             return Ok(());
         }
         match Clock::of(&time.stamps) {
@@ -190,7 +192,7 @@ impl<R: Read> TableReader<R> {
 
     /// The rate of the preamble has more digits than that of the times.
     fn take_stated_rate(&mut self) {
-        let Some(stated) = self.table.stated_rate() else { return };
+        let Some(stated) = self.table.stated_rate().filter(|_| !self.is_rate_known) else { return };
         if let Some(rate) = self.header.rate {
             let apart = (rate - stated.hertz).abs();
             if apart > self.header.rate_error + stated.error + SAME_RATE * rate {

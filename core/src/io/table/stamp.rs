@@ -61,7 +61,8 @@ fn decimal(text: &str) -> Option<Stamp> {
         None => (text, 0),
     };
     let unsigned = number.strip_prefix(['-', '+']).unwrap_or(number);
-    let (mut mantissa, mut exponent, mut is_after, mut any, mut is_full) = (0_i64, power, false, false, false);
+    let (mut mantissa, mut exponent, mut is_after, mut any, mut is_full) =
+        (0_i64, power, false, false, false);
     for byte in unsigned.bytes() {
         match byte {
             b'.' | b',' if !is_after => is_after = true,
@@ -188,7 +189,8 @@ mod tests {
         ] {
             assert_eq!(Stamp::parse(text).map(Stamp::value), Some(seconds), "{text}");
         }
-        for text in ["10:", "25:00:00", "2026-13-01 00:00:00", "1:2:3:4", "2026-11-28T10:00:é", ":", "-1:00"] {
+        for text in ["10:", "25:00:00", "2026-13-01 00:00:00", "1:2:3:4", "2026-11-28T10:00:é", ":", "-1:00"]
+        {
             assert_eq!(Stamp::parse(text), None, "{text}");
         }
     }

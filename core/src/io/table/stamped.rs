@@ -1,10 +1,10 @@
 //! Tables whose lines say when each was taken, at any times.
 
+use super::Table;
 use super::clock::Clock;
 use super::headings::{Role, unit_by_size};
 use super::options::{TableOptions, TimeColumn};
 use super::stamp::Stamp;
-use super::Table;
 use crate::io::IoError;
 use crate::units::Seconds;
 use std::fs::File;
@@ -30,7 +30,9 @@ pub fn read_stamped(path: &Path, options: &TableOptions) -> Result<Option<Stampe
     let name = path.display().to_string();
     let file = File::open(path).map_err(IoError::system(&name, "read it"))?;
     // What is no text is no table.
-    let Ok(mut table) = Table::new(file, &name, "a table of samples", options, BUFFER) else { return Ok(None) };
+    let Ok(mut table) = Table::new(file, &name, "a table of samples", options, BUFFER) else {
+        return Ok(None);
+    };
     let column = match (&options.time, table.time()) {
         (TimeColumn::None, _) => return Ok(None),
         (_, Some(column)) => column,

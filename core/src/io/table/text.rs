@@ -24,7 +24,10 @@ enum Encoding {
     /// Nothing was read yet.
     Unknown,
     /// ASCII and its supersets, after the first bytes.
-    Bytes { head: [u8; 2], left: usize },
+    Bytes {
+        head: [u8; 2],
+        left: usize,
+    },
     Utf16(Box<Decoder>),
 }
 

@@ -16,8 +16,7 @@ fn numbers(bytes: &[u8]) -> Vec<f64> {
 }
 
 fn read_with(text: impl AsRef<[u8]>, options: &TableOptions) -> Result<Found, String> {
-    let mut reader =
-        TableReader::new(text.as_ref(), "x.csv", options).map_err(|error| error.to_string())?;
+    let mut reader = TableReader::new(text.as_ref(), "x.csv", options).map_err(|error| error.to_string())?;
     let mut bytes = Vec::new();
     reader.read_to_end(&mut bytes).map_err(|error| error.to_string())?;
     let StreamHeader { channels, rate, .. } = reader.header();
@@ -144,7 +143,8 @@ fn instruments() -> Vec<(&'static str, String)> {
 fn instruments_are_read_as_they_write() {
     let want: Vec<f64> = (0..20).flat_map(|k| [f64::from(k % 3) + 0.5, -0.25]).collect();
     for (name, text) in instruments() {
-        let Found { channels, rate, samples, .. } = read(&text).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let Found { channels, rate, samples, .. } =
+            read(&text).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!((channels, &samples), (2, &want), "{name}");
         if name != "PicoScope in German" {
             assert!(rate.is_some_and(|rate| (rate - 1e6).abs() < 1.0), "{name}: {rate:?}");
@@ -175,7 +175,8 @@ fn a_first_column_that_is_a_ramp_is_no_channel() {
     assert_eq!(read(table("", 40, |k| (k + k * k / 25).to_string())).unwrap().channels, 2);
     assert_eq!(read(lines(40, |k| k.to_string())).unwrap().channels, 1);
     // Lines that are missing in an index are lost.
-    let lost: String = ramp.lines().filter(|line| !line.starts_with("7,")).fold(String::new(), |t, l| t + l + "\n");
+    let lost: String =
+        ramp.lines().filter(|line| !line.starts_with("7,")).fold(String::new(), |t, l| t + l + "\n");
     let read = read(lost).unwrap();
     assert_eq!(read.faults, [InputFault::RampLeftOut, InputFault::LinesMissing { lines: 1 }]);
     assert!(read.samples[7].is_nan() && read.samples.len() == 20);
@@ -222,14 +223,19 @@ fn missing_lines_are_lost_samples_to_the_last_line() {
         .fold("t,x\n".to_owned(), |text, (_, line)| text + line + "\n");
     let read = read(&some).unwrap();
     assert_eq!(read.faults, [InputFault::LinesMissing { lines: 3 }]);
-    let is_right = |(k, x): (usize, &f64)| if [5, 69_000, 69_001].contains(&k) { x.is_nan() } else { *x == k as f64 };
+    let is_right =
+        |(k, x): (usize, &f64)| if [5, 69_000, 69_001].contains(&k) { x.is_nan() } else { *x == k as f64 };
     assert!(read.samples.len() == 70_000 && read.samples.iter().enumerate().all(is_right));
     for (late, part) in [
         ("2.879167,5", "line 69103: it has the time of the line before"),
         ("2.879100,5", "line 69103: its time is 67 us before"),
-        ("2.879220,5", "line 69103: the times are not evenly spaced: the step to this line is 53 us where 41.6667 us"),
+        (
+            "2.879220,5",
+            "line 69103: the times are not evenly spaced: the step to this line is 53 us where 41.6667 us",
+        ),
     ] {
-        let text: String = lines(69_101, line).lines().skip(1).fold("t,x\n0.000000,0\n".to_owned(), |t, l| t + l + "\n");
+        let text: String =
+            lines(69_101, line).lines().skip(1).fold("t,x\n0.000000,0\n".to_owned(), |t, l| t + l + "\n");
         let message = refusal(text + late + "\n");
         assert!(message.contains(part), "{message}");
     }
@@ -242,11 +248,8 @@ fn times_that_cannot_show_the_step_are_refused_in_numbers() {
     assert!(message.contains("100 ns") && message.contains("about 20.0"), "{message}");
     let stated = read("Sample Interval,2e-08\nTime,CH1\n".to_owned() + &table).unwrap();
     assert!(stated.rate.is_some_and(|rate| (rate - 5e7).abs() < 1e-3));
-    let none = TableOptions {
-        time: TimeColumn::None,
-        columns: vec![Column::Number(1)],
-        ..TableOptions::default()
-    };
+    let none =
+        TableOptions { time: TimeColumn::None, columns: vec![Column::Number(1)], ..TableOptions::default() };
     let read = read_with("Time,CH1\n".to_owned() + &table, &none).unwrap();
     assert_eq!((read.channels, read.rate, read.samples.len()), (1, None, 600));
 }
@@ -339,7 +342,9 @@ impl io::Read for Live {
 #[test]
 fn live_lines_with_their_times_are_handed_on_one_by_one() {
     let lines = std::rc::Rc::new(std::cell::Cell::new(0));
-    let mut reader = TableReader::new(Live { lines: lines.clone(), rest: Vec::new() }, "x.csv", &TableOptions::default()).unwrap();
+    let mut reader =
+        TableReader::new(Live { lines: lines.clone(), rest: Vec::new() }, "x.csv", &TableOptions::default())
+            .unwrap();
     // The headings and two lines: the least that tells a rate.
     assert_eq!(lines.get(), 3);
     let header = reader.header();
@@ -385,7 +390,11 @@ impl Dialect {
             Delimiter::Space => " ",
         };
         let row = |row: &Vec<f64>| row.iter().map(cell).collect::<Vec<_>>().join(between) + self.end;
-        let heading = if self.heading { vec!["\u{b5}V"; rows[0].len()].join(between) + self.end } else { String::new() };
+        let heading = if self.heading {
+            vec!["\u{b5}V"; rows[0].len()].join(between) + self.end
+        } else {
+            String::new()
+        };
         let text = heading + &rows.iter().map(row).collect::<String>();
         match self.encoding {
             0 => text.into_bytes(),
