@@ -51,8 +51,8 @@ pub fn taps_of_csv(bytes: &[u8]) -> Result<Vec<Vec<f64>>, TapsError> {
     let options = TableOptions::default();
     let mut table = Table::new(bytes, "", "a table of taps", &options, BUFFER).map_err(broken)?;
     let places = table.columns();
-    let is_polyphase =
-        places.len() == 4 && places.iter().zip(HEADINGS).all(|(i, known)| table.name(*i) == known);
+    let named = places.iter().zip(HEADINGS).filter(|(place, known)| table.name(**place) == *known);
+    let is_polyphase = named.count() == HEADINGS.len();
     let mut rows: Vec<Vec<f64>> = Vec::new();
     while table.next_row().map_err(broken)? {
         let number = |column: &usize| match table.number(*column) {

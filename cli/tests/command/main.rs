@@ -42,6 +42,7 @@ mod schema;
 mod simulate;
 #[cfg(unix)]
 mod stream;
+mod tables;
 mod understanding;
 mod usage;
 mod verify;

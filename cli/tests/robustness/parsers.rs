@@ -96,12 +96,15 @@ fn tables_and_arrays_of_samples() {
         let Some(mut reader) = answered(TableReader::new(bytes, "seed", &TableOptions::default())) else {
             return refusals += 1;
         };
-        let mut frames = Vec::new();
-        while let Some(count) = answered(reader.read(&mut [0; 24])).filter(|count| *count > 0) {
-            frames.resize(frames.len() + count, 0);
-            answers += 1;
+        // Lines that are missing by the times are NaN, and may be many.
+        let (mut held, mut reads, mut some) = (0, 0, [0; 24]);
+        while let Some(count) = answered(reader.read(&mut some)).filter(|count| *count > 0 && reads < 1000) {
+            let samples = some[..count].as_chunks().0.iter().map(|sample| f64::from_le_bytes(*sample));
+            held += samples.filter(|sample| !sample.is_nan()).count();
+            reads += 1;
         }
-        assert!(frames.len() <= 8 * (bytes.len() + 1));
+        answers += reads;
+        assert!(held <= bytes.len() + 1);
     });
     assert!(answers > 1000 && refusals > 100, "{answers} {refusals}");
     (answers, refusals) = (0, 0);

@@ -1,7 +1,7 @@
 //! Errors of reading and writing samples, and faults of inputs that are tolerated.
 
 use crate::files::FileError;
-use crate::messages::{Number, Quoted};
+use crate::messages::{Number, Quoted, counted};
 use crate::quantity::FullScale;
 use std::io;
 
@@ -124,7 +124,7 @@ pub enum InputFault {
     )]
     RampLeftOut,
     /// Times of a table lie several steps apart.
-    #[error("{lines} lines are missing by its times; their samples count as lost")]
+    #[error("its times leave out {}; the samples there count as lost", counted(*.lines as usize, "line"))]
     LinesMissing {
         /// Number of these lines.
         lines: u64,

@@ -10,14 +10,15 @@ const LOOKED_AT: u32 = 10_000;
 #[derive(Debug, Default)]
 pub(super) struct BareCommas {
     lines: u32,
-    is_over: bool,
+    /// Nothing more is looked for.
+    pub(super) is_over: bool,
 }
 
 impl BareCommas {
     /// What is wrong with a line.
     pub(super) fn find(&mut self, cells: &Cells) -> Option<String> {
         self.lines += 1;
-        if self.is_over || self.lines > LOOKED_AT {
+        if self.is_over {
             return None;
         }
         let is_whole = |cell: &str| cell.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'-' | b'+'));
@@ -28,7 +29,10 @@ impl BareCommas {
         // Codes may be padded in all columns; quotes tell commas from delimiters.
         let is_even = cells.count.is_multiple_of(2);
         let pairs = || (0..cells.count / 2).map(|pair| (cells.get(2 * pair), cells.get(2 * pair + 1)));
-        self.is_over = !is_even || !cells.iter().all(is_whole) || pairs().any(|(whole, _)| is_padded(whole));
+        self.is_over = self.lines > LOOKED_AT
+            || !is_even
+            || !cells.iter().all(is_whole)
+            || pairs().any(|(whole, _)| is_padded(whole));
         if self.is_over {
             return None;
         }

@@ -34,11 +34,13 @@ impl Candidate {
         let (first, columns) = (table.first_column()?, table.columns());
         let role = table.role(first);
         match role {
-            _ if options.columns.len() > 0 && columns.contains(&first) => None,
+            _ if !options.columns.is_empty() && columns.contains(&first) => None,
             Role::Index if table.width() > 2 && matches!(table.role(1), Role::Time(_)) => {
                 certain(1, table.role(1))
             }
             Role::Time(_) => certain(first, role),
+            // Instruments that state the rate number their lines.
+            Role::Index if columns.len() > 1 && table.stated_rate().is_some() => certain(first, role),
             Role::Index | Role::Other if columns.len() > 1 && options.columns.is_empty() => {
                 Some(Self { column: first, role, is_certain: false, stamps: Vec::new() })
             }

@@ -17,7 +17,7 @@ const STEP_RANGE: f64 = 0.25;
 const REPEATED: f64 = 0.25;
 /// Share of a step up to which the number of missing lines is known.
 const COUNTED: f64 = 0.25;
-/// Most lines that are missing at once, 2^26: a wrong stamp would lead to endless output.
+/// Most lines that are missing in all, 2^26: a wrong stamp would lead to endless output.
 const MOST_MISSING: f64 = (1_u64 << 26) as f64;
 
 /// Why a time stamp is none of an even clock. Times are in the unit of the column.
@@ -57,8 +57,8 @@ impl Unsteady {
                 time(by)
             ),
             Self::Uneven { step, usual, least, most, digit } => format!(
-                "the times are not evenly spaced: the step to this line is {} where {} is due, steps so far lie between {} \
-                 and {}, and the last digit is {}; hybank merge takes samples at their own times, or, if they are even in \
+                "the times are not evenly spaced: the step to this line is {} where {} is due, steps lie between {} and \
+                 {}, and the last digit is {}; hybank merge takes samples at their own times, or, if they are even in \
                  truth, state that no column is the time (--time-column none --columns 2)",
                 time(step),
                 time(usual),
@@ -82,6 +82,8 @@ pub(super) struct Clock {
     /// The last stamp after the first, and the steps between them.
     last: f64,
     steps: u64,
+    /// Lines that are missing so far.
+    missing: f64,
     low: f64,
     high: f64,
     /// The step by the stamps that were read at first.
@@ -92,7 +94,7 @@ pub(super) struct Clock {
     /// fewer decimals as the time grows.
     digit: f64,
     digits: i32,
-    /// The shortest and the longest single step.
+    /// The shortest and the longest step.
     least: f64,
     most: f64,
 }
@@ -108,19 +110,22 @@ impl Clock {
             first,
             last: 0.0,
             steps: 0,
+            missing: 0.0,
             low: 0.0,
             high: 0.0,
             usual: 0.0,
             error: 0.0,
             digit: first.digit(),
             digits: first.digits(),
-            least: f64::INFINITY,
+            least: 0.0,
             most: 0.0,
         };
         stamps.iter().for_each(|stamp| clock.learn_digits(*stamp));
         let steps: Vec<f64> = stamps.windows(2).map(|pair| pair[1].since(pair[0])).collect();
         let usual = clock.usual_step(&steps)?;
         clock.usual = usual;
+        clock.least = steps.iter().copied().fold(usual, f64::min);
+        clock.most = steps.iter().copied().fold(usual, f64::max);
         let range = STEP_RANGE * usual + 2.0 * ROUNDING * clock.digit;
         (clock.low, clock.high) = ((usual - range).max(0.0), usual + range);
         let mut missing = vec![0];
@@ -176,7 +181,7 @@ impl Clock {
         }
         let lines = (step / usual).round();
         let is_counted = lines * (self.high - self.low) <= 2.0 * COUNTED * usual || self.is_exact();
-        if lines > MOST_MISSING || lines > 1.0 && self.steps > 1 && !is_counted {
+        if self.missing + lines > MOST_MISSING || lines > 1.0 && self.steps > 1 && !is_counted {
             return Err(Unsteady::Gap { lines });
         }
         let total = self.steps + lines as u64;
@@ -187,11 +192,10 @@ impl Clock {
         if lines < 1.0 || low > high {
             return Err(Unsteady::Uneven { step, usual, least, most, digit: self.digit });
         }
-        if lines == 1.0 {
-            (self.least, self.most) = (least, most);
-        }
+        (self.least, self.most) = (least, most);
         (self.low, self.high, self.last, self.steps) = (low, high, at, total);
         self.error = error * HALF / ROUNDING;
+        self.missing += lines - 1.0;
         Ok(lines as u64 - 1)
     }
 

@@ -106,6 +106,11 @@ impl<R: Read> Table<R> {
         self.preamble.blank.iter().position(|blank| !blank)
     }
 
+    /// True if a line has come that may show decimal commas between commas.
+    fn may_have_bare_commas(&self) -> bool {
+        self.is_more_at_hand() && self.bare.as_ref().is_some_and(|bare| !bare.is_over)
+    }
+
     /// The column of time that the options name.
     fn time(&self) -> Option<usize> {
         self.preamble.layout.time

@@ -103,8 +103,11 @@ impl<R: Read> TableReader<R> {
         }
         let mut lines = Vec::new();
         while lines.len() < LOOKED_AT {
-            let least = candidate.as_ref().map_or(1, Candidate::least_lines);
-            if lines.len() >= least && !self.table.is_more_at_hand() || !self.table.next_row()? {
+            let wanted = match &candidate {
+                Some(time) => self.table.is_more_at_hand() || lines.len() < time.least_lines(),
+                None => lines.is_empty() || self.table.may_have_bare_commas(),
+            };
+            if !wanted || !self.table.next_row()? {
                 break;
             }
             candidate = match candidate {

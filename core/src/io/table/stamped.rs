@@ -33,16 +33,14 @@ pub fn read_stamped(path: &Path, options: &TableOptions) -> Result<Option<Stampe
     let Ok(mut table) = Table::new(file, &name, "a table of samples", options, BUFFER) else {
         return Ok(None);
     };
-    let column = match (&options.time, table.time()) {
-        (TimeColumn::None, _) => return Ok(None),
-        (_, Some(column)) => column,
-        _ => 0,
-    };
-    let unit = match (table.width(), table.time()) {
-        (0 | 1, _) => return Ok(None),
-        (_, None) if !matches!(table.role(0), Role::Time(_)) => return Ok(None),
-        _ => table.role(column),
-    };
+    if options.time == TimeColumn::None || table.width() < 2 {
+        return Ok(None);
+    }
+    let role = table.role(table.time().unwrap_or(0));
+    if table.time().is_none() && !matches!(role, Role::Time(_)) {
+        return Ok(None);
+    }
+    let column = table.time().unwrap_or(0);
     let columns: Vec<usize> = table.columns().into_iter().filter(|other| *other != column).collect();
     let mut read = StampedTable { stamps: Vec::new(), columns: vec![Vec::new(); columns.len()] };
     let mut stamps: Vec<Stamp> = Vec::new();
@@ -58,7 +56,7 @@ pub fn read_stamped(path: &Path, options: &TableOptions) -> Result<Option<Stampe
             numbers.push(table.number(*column)?);
         }
     }
-    read.stamps = times(&stamps, unit);
+    read.stamps = times(&stamps, role);
     Ok(Some(read))
 }
 
