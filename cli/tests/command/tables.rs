@@ -30,11 +30,11 @@ fn files_of_an_oscilloscope_are_fused() {
     let german = table("Zeit;A;B\n(ms);(V);(V)\n\n", &a, |_, x| format!("0;{x};0"));
     desk.write("german.csv", german.replace('.', ","));
     for inputs in [&["scope.csv"][..], &["a.csv", "b.csv"]] {
-        desk.good(
+        let said = desk.good(
             &[&["fuse", "bank.json", "-o", "out.wav", "--keep-latency", "--force"][..], inputs].concat(),
         );
         assert!(wav::samples(&desk, "out.wav") == fused(&interleaved(&a, &b)), "{inputs:?}");
-        assert_eq!(desk.read("out.wav")[24..28], 2_000_000_u32.to_le_bytes(), "{inputs:?}");
+        assert!(said.contains("2 MS/s"), "{inputs:?}: {said}");
     }
     let named =
         ["fuse", "bank.json", "german.csv", "--columns", "A,B", "--time-column", "none", "-o", "named.wav"];
@@ -59,7 +59,7 @@ fn a_first_column_that_is_a_ramp_is_said_or_refused() {
     let desk = Desk::new();
     let (a, b) = channels(300);
     desk.write("three.csv", table("", &a, |k, x| format!("{k},{x},{}", b[k])));
-    desk.write("two.csv", table("", &a, |k, x| format!("{k},{x}")));
+    desk.write("two.csv", table("", &a, |k, x| format!("{:.10},{x}", k as f64 / 1024.0)));
     let fuse = ["fuse", "bank.json", "-o", "out.wav", "--keep-latency", "--force"];
     let said = desk.run(&[&fuse[..], &["three.csv"]].concat(), &[]);
     assert!(said.status.success() && text(&said.stderr).contains("steady ramp"), "{said:?}");
@@ -70,7 +70,7 @@ fn a_first_column_that_is_a_ramp_is_said_or_refused() {
         &["two.csv: 1", "steady ramp", "--time-column none"],
     );
     desk.good(&[&fuse[..], &["two.csv", "--time-column", "none"]].concat());
-    let ramp: Vec<f32> = (0..300).map(|k| k as f32).collect();
+    let ramp: Vec<f32> = (0..300).map(|k| k as f32 / 1024.0).collect();
     assert!(wav::samples(&desk, "out.wav") == fused(&interleaved(&ramp, &a)));
     let strict = [&fuse[..], &["three.csv", "--strict"]].concat();
     desk.refused(1, &strict, &["steady ramp"]);
@@ -91,9 +91,9 @@ fn times_are_judged_to_the_last_line() {
     desk.write("late.csv", whole.clone() + "0.125010,0,0\n");
     desk.write("back.csv", whole.clone() + "0.001000,0,0\n");
     let fuse = ["fuse", "bank.json", "-o", "out.wav", "--force"];
-    let report = desk.report(&[&fuse[..], &["lost.csv"]].concat());
+    let report = desk.report(&[&fuse[..4], &["lost.csv"]].concat());
     assert_eq!(report["samples"], 6000);
-    assert!(report["warnings"].to_string().contains("1 lines are missing by its times"), "{report}");
+    assert!(report["warnings"].to_string().contains("its times leave out 1 line"), "{report}");
     desk.refused(
         1,
         &[&fuse[..], &["late.csv"]].concat(),
