@@ -142,7 +142,7 @@ impl Args {
         let options = ReadOptions { scale, ..own };
         let (mut records, mut formats, mut headers) = (Vec::new(), Vec::new(), Vec::new());
         for path in &self.captures {
-            let mut reader = start(std::slice::from_ref(path), options)?;
+            let mut reader = start(std::slice::from_ref(path), options.clone())?;
             check_rate(spec, &reader).map_err(failed)?;
             let Some(header) = reader.headers().next().map(|(_, header)| *header) else { continue };
             headers.push((path.display().to_string(), header));

@@ -3,6 +3,7 @@
 
 use super::output::WAV;
 use super::print::{Failure, failed, failed_at, is_dash};
+use super::table_args::TableArgs;
 use hybank::bank::Bank;
 use hybank::captures::{Converters, FileFormat};
 use hybank::io::{Coding, MultiReader, ReadOptions, StatedScale, TimeInterleaving};
@@ -12,7 +13,7 @@ use hybank::quantity::{self, FullScale};
 use std::path::Path;
 
 /// Options of the commands that read captures.
-#[derive(Debug, Clone, Copy, clap::Args)]
+#[derive(Debug, Clone, clap::Args)]
 pub(super) struct CaptureArgs {
     /// Sample format of captures: wav, csv, or a raw format as in ffmpeg (s16le, f32le, ..; with c before it
     /// for complex samples: cf32, cs16). SigMF recordings, .csv, .npy, .mat (x.mat:name for one variable of
@@ -30,6 +31,8 @@ pub(super) struct CaptureArgs {
     /// Use only this channel of each capture, from 1
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
     channel: Option<u16>,
+    #[command(flatten)]
+    pub(super) table: TableArgs,
 }
 
 /// Reads the name of a coding.
@@ -40,7 +43,7 @@ pub(super) fn coding(name: &str) -> Result<Coding, String> {
 
 impl CaptureArgs {
     /// Refuses impossible combinations; `takes_turns` with --interleaved.
-    pub(super) fn check(self, takes_turns: bool) -> Result<(), Failure> {
+    pub(super) fn check(&self, takes_turns: bool) -> Result<(), Failure> {
         if self.channel.is_some() && takes_turns {
             let message =
                 "--channel and --interleaved: converters that take turns share one channel; extract it first";
@@ -50,18 +53,19 @@ impl CaptureArgs {
     }
 
     /// What was given, as it is typed.
-    pub(super) fn typed(self) -> String {
+    pub(super) fn typed(&self) -> String {
         let format = (self.format != Coding::Wav).then(|| format!(" --format {}", self.format));
         let channels = self.channels.map(|channels| format!(" --channels {channels}"));
         let scale = self.scale.given().map(|scale| format!(" --full-scale {scale}"));
         let channel = self.channel.map(|channel| format!(" --channel {channel}"));
         let iq = self.iq.then(|| " --iq".to_owned());
-        [format, channels, iq, scale, channel].into_iter().flatten().collect()
+        let table = Some(self.table.typed());
+        [format, channels, iq, scale, channel, table].into_iter().flatten().collect()
     }
 
     /// For a recording that the one called `file` is compared with: what the options say of the format holds
     /// for both, unless its name says that it is WAV.
-    pub(super) fn of_reference(self, file: &Path, reference: &Path) -> ReadOptions<'static> {
+    pub(super) fn of_reference(&self, file: &Path, reference: &Path) -> ReadOptions<'static> {
         let ending = |path: &Path| path.extension().unwrap_or_default().to_ascii_lowercase();
         let own = self.format().options(1, 1);
         match (ending(file), ending(reference)) {
@@ -72,13 +76,14 @@ impl CaptureArgs {
     }
 
     /// What is said of captures that do not state their format.
-    pub(super) fn format(self) -> FileFormat {
+    pub(super) fn format(&self) -> FileFormat {
         FileFormat {
             coding: self.format,
             channels: self.channels.map(usize::from),
             only: self.channel.map(|channel| usize::from(channel) - 1),
             is_iq: self.iq,
             full_scale: self.scale.given(),
+            table: self.table.options(),
         }
     }
 }

@@ -19,7 +19,7 @@ pub(super) struct CaptureFile {
 }
 
 /// How a recording is read.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Reading {
     /// Format and channel; a mono recording needs no channel.
     pub(super) options: ReadOptions<'static>,

@@ -10,7 +10,6 @@ use super::print::{Failure, is_dash, print, print_report, say_understood};
 use super::run::{Finished, Job, RunArgs, RunReport};
 use super::tracked::{self, TrackArgs};
 use hybank::bank::Bank;
-use hybank::captures::Converters;
 use hybank::io::{Container, MultiReader, OnStall, PcmFormat};
 use hybank::messages::{Quoted, counted};
 use hybank::overview::BeforeAfter;
@@ -148,8 +147,7 @@ impl Args {
     fn fuse(&self, job: &Job<'_>, observer: &mut RunObserver) -> Result<(), Failure> {
         let begin = Instant::now();
         if self.track.has_stamps() {
-            let scale = Converters::from(job.bank).scale(self.reading.scale.given());
-            return tracked::fuse_stamps(job, &self.inputs, scale);
+            return tracked::fuse_stamps(job, &self.inputs, &self.reading.format());
         }
         let mut reader = self.start_reader(job, &mut |stall| observer.stalled(stall))?;
         if self.bit_true.is_wanted() {

@@ -35,6 +35,7 @@ mod report;
 mod run;
 mod simulate;
 mod stream;
+mod table_args;
 mod texts;
 mod tracked;
 mod verify;

@@ -51,7 +51,7 @@ pub(super) struct Args {
     reference: Option<PathBuf>,
     #[command(flatten)]
     reading: CaptureArgs,
-    /// Sample rate of a recording that states none (48kHz, 1GS/s, or hertz)
+    /// Sample rate of a recording that states none (48kHz, 1GS/s, or hertz); of a table in place of its times
     #[arg(long, value_name = "F", value_parser = rate)]
     rate: Option<Hertz>,
     /// Samples at either end that are not measured, such as those before a filter has settled
@@ -167,7 +167,8 @@ impl Args {
     }
 
     fn reading(&self) -> Reading {
-        let options = self.reading.format().options(1, 1);
+        let mut options = self.reading.format().options(1, 1);
+        options.table.is_rate_known = self.rate.is_some();
         Reading { options, rate: self.rate, most: MOST_MEASURED, takes_complex: true }
     }
 
@@ -182,7 +183,8 @@ impl Args {
     }
 
     fn compared(&self, capture: &CaptureFile, path: &Path) -> Result<ReferenceReport, Failure> {
-        let options = self.reading.of_reference(&self.file, path);
+        let mut options = self.reading.of_reference(&self.file, path);
+        options.table.is_rate_known = self.rate.is_some();
         let reading = Reading { options, takes_complex: false, ..self.reading() };
         let reference = CaptureFile::read(path, reading)?.trimmed(path, self.skip)?;
         let file = Quoted(name(&self.file));

@@ -8,7 +8,8 @@ use super::print::{Failure, check_json, failed, failed_at, is_dash, name, show, 
 use super::written::{Mono, begin_recording, check_output, write_text};
 use hybank::captures::Captures;
 use hybank::files::commit_all;
-use hybank::io::{Container, PcmFormat, read_stamped};
+use hybank::io::table::read_stamped;
+use hybank::io::{Container, PcmFormat};
 use hybank::merge::{Found, MergeSettings, Merged, Source, merge};
 use hybank::messages::{Quoted, counted};
 use hybank::quantity::{self, Time, readable};
@@ -118,7 +119,9 @@ impl Args {
         if is_dash(path) || !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
             return Ok(None);
         }
-        let Some(table) = read_stamped(path).map_err(failed)? else { return Ok(None) };
+        let Some(table) = read_stamped(path, &self.reading.table.options()).map_err(failed)? else {
+            return Ok(None);
+        };
         let [first, .., last] = table.stamps.as_slice() else {
             return Err(failed_at(path, "it has fewer than 2 lines of samples; give a longer recording"));
         };

@@ -5,6 +5,7 @@ use super::observer::RunObserver;
 use super::output::is_wav;
 use super::print::{print_report, say_line, say_understood};
 use super::run::{Finished, Job, RunArgs, RunReport};
+use super::table_args::TableArgs;
 use super::{Failure, bank_file};
 use hybank::bank::Bank;
 use hybank::captures::FileFormat;
@@ -46,6 +47,8 @@ pub(super) struct Args {
     output_format: Option<Coding>,
     #[command(flatten)]
     scale: ScaleArgs,
+    #[command(flatten)]
+    table: TableArgs,
     /// Interleaved channels of each raw input [default: 1 each, or all in a single input]
     #[arg(long, value_name = "C", value_parser = clap::value_parser!(u16).range(1..))]
     channels: Option<u16>,
@@ -133,6 +136,7 @@ impl Args {
             only: None,
             is_iq: false,
             full_scale: self.scale.given(),
+            table: self.table.options(),
         };
         let mut reader = job.start_reader(inputs, format, &mut |stall| observer.stalled(stall))?;
         self.check_output(reader.is_complex())?;

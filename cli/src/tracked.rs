@@ -5,9 +5,10 @@ use super::print::{Failure, check_strict, failed, failed_at, is_dash, print, pri
 use super::run::Job;
 use super::written::{Mono, begin_recording};
 use hybank::bank::Bank;
-use hybank::captures::Captures;
+use hybank::captures::{Captures, Converters, FileFormat};
 use hybank::files::{Bound, commit_all, read_text};
-use hybank::io::{MultiReader, StatedScale, read_stamped};
+use hybank::io::MultiReader;
+use hybank::io::table::{TableOptions, read_stamped};
 use hybank::merge::{DelayTrack, MergeError, Tracked, fuse_stamped, fuse_tracked};
 use hybank::messages::{Quoted, counted};
 use hybank::quantity::readable;
@@ -82,10 +83,11 @@ pub(super) fn fuse(job: &Job<'_>, table: &Path, mut reader: MultiReader) -> Resu
 }
 
 /// Fuses tables whose samples have stamps.
-pub(super) fn fuse_stamps(job: &Job<'_>, inputs: &[PathBuf], scale: StatedScale) -> Result<(), Failure> {
+pub(super) fn fuse_stamps(job: &Job<'_>, inputs: &[PathBuf], format: &FileFormat) -> Result<(), Failure> {
+    let scale = Converters::from(job.bank).scale(format.full_scale);
     let (mut channels, mut stamps) = (Vec::new(), Vec::new());
     for path in inputs {
-        let table = read_stamped(path).map_err(failed)?.ok_or_else(|| {
+        let table = read_stamped(path, &format.table).map_err(failed)?.ok_or_else(|| {
             failed_at(path, "no table whose first column is a time, which --stamps needs; as `time,x` with lines of numbers")
         })?;
         for column in table.columns {
@@ -125,7 +127,7 @@ fn read(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("jsonl")) {
         return read_lines(path, bank);
     }
-    let table = read_stamped(path).map_err(failed)?.ok_or_else(|| {
+    let table = read_stamped(path, &TableOptions::default()).map_err(failed)?.ok_or_else(|| {
         failed_at(
             path,
             "no table of delays: its first line has no headings of which the first is a time, as `time,delay 1,delay 2`",

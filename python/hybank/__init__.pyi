@@ -341,6 +341,11 @@ def read(
     lost: _Path | None = None,
     max_lost: int | None = None,
     longest: bool = False,
+    skip_lines: int = 0,
+    columns: Sequence[int | str] | None = None,
+    time_column: int | str | None = None,
+    delimiter: str | None = None,
+    decimal: str | None = None,
 ) -> Captures: ...
 def verify(bank: Bank | _Path, *, search: bool = False) -> Verified: ...
 def analyze(

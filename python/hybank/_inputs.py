@@ -49,8 +49,9 @@ def _are_files(x):
 
 @checked
 def read(
-    files, *, bank=None, format="wav", channels=None, channel=None, iq=False, full_scale=None, sample_bits=None, interleaved=None,
-    lost=None, max_lost=None, longest=False
+    files, *, bank=None, format="wav", channels=None, channel=None, iq=False, full_scale=None, sample_bits=None,
+    interleaved=None, lost=None, max_lost=None, longest=False, skip_lines=0, columns=None, time_column=None, delimiter=None,
+    decimal=None
 ):
     """Read recordings as ``hybank fuse`` reads them.
 
@@ -80,6 +81,16 @@ def read(
         The most frames that an input may leave out.
     longest : bool
         Read until the last channel ends; the others are NaN from their ends on.
+    skip_lines : int
+        Lines at the beginning of a table that are not looked at.
+    columns : list of int or str, optional
+        The columns of a table that are channels, by number from 1 or by heading; all but the time otherwise.
+    time_column : int or str, optional
+        The column of a table that says when each line was taken, or "none".
+    delimiter : str, optional
+        Between the cells of a table: ",", ";", "tab" or "space".
+    decimal : str, optional
+        The mark before the decimals in a table: "point" or "comma".
 
     Returns
     -------
@@ -102,7 +113,9 @@ def read(
     options = {
         "format": format, "channels": channels, "channel": channel,
         "iq": iq, "full_scale": full_scale, "interleaved": interleaved,
-        "lost": lost, "max_lost": max_lost, "longest": longest,
+        "lost": lost, "max_lost": max_lost, "longest": longest, "skip_lines": skip_lines,
+        "columns": [str(column) for column in columns or ()],
+        "time_column": None if time_column is None else str(time_column), "delimiter": delimiter, "decimal": decimal,
     }
     return _read(files, bank, options)
 
@@ -110,8 +123,10 @@ def read(
 def _read(files, source, options):
     """Recordings for a bank, for a spec, or for nothing in particular."""
     names = [files] if isinstance(files, (str, os.PathLike)) else list(files)
-    usual = dict.fromkeys(("channels", "channel", "full_scale", "interleaved", "lost", "max_lost"))
-    options = {"format": "wav", "iq": False, "longest": False, **usual, **options}
+    usual = dict.fromkeys(
+        ("channels", "channel", "full_scale", "interleaved", "lost", "max_lost", "time_column", "delimiter", "decimal")
+    )
+    options = {"format": "wav", "iq": False, "longest": False, "skip_lines": 0, "columns": [], **usual, **options}
     found = _hybank.read(names, options, source)
     parts = found["channels"]
     is_even = all(len(part) == len(parts[0]) for part in parts)

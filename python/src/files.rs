@@ -6,12 +6,14 @@ use crate::errors::{capture_error, io_error, refused, warn};
 use crate::formats;
 use crate::sources;
 use hybank::captures::{CaptureError, Captures, ChannelSamples, Converters, FileFormat};
+use hybank::io::table::{TableOptions, TimeColumn};
 use hybank::io::{LostSamples, MAX_LOST, MultiReader, ReadOptions, TimeInterleaving, Until};
 use hybank::pipeline::matching;
 use numpy::{Complex64, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 /// Samples of a channel that are read at most: an array of more is 32 GiB.
 const MOST: usize = 1 << 32;
@@ -29,6 +31,11 @@ pub(crate) struct Options<'py> {
     lost: Option<PathBuf>,
     max_lost: Option<u64>,
     longest: bool,
+    skip_lines: u64,
+    columns: Vec<String>,
+    time_column: Option<String>,
+    delimiter: Option<String>,
+    decimal: Option<String>,
 }
 
 /// What `work` makes of the converters of a bank, or of a spec.
@@ -111,8 +118,29 @@ impl Options<'_> {
             only: self.channel.map(|channel| channel.saturating_sub(1)),
             is_iq: self.iq,
             full_scale: formats::full_scale(self.full_scale.as_ref())?,
+            table: self.table()?,
         })
     }
+}
+
+impl Options<'_> {
+    fn table(&self) -> PyResult<TableOptions> {
+        let columns = self.columns.iter().map(|column| parsed("columns", column));
+        let time = self.time_column.as_deref().map(|column| parsed("time_column", column)).transpose()?;
+        Ok(TableOptions {
+            skip_lines: self.skip_lines,
+            columns: columns.collect::<PyResult<_>>()?,
+            time: time.unwrap_or(TimeColumn::Found),
+            delimiter: self.delimiter.as_deref().map(|text| parsed("delimiter", text)).transpose()?,
+            decimal: self.decimal.as_deref().map(|text| parsed("decimal", text)).transpose()?,
+            ..TableOptions::default()
+        })
+    }
+}
+
+/// What the text given as `name` means.
+fn parsed<T: FromStr<Err = String>>(name: &str, text: &str) -> PyResult<T> {
+    text.parse().map_err(|problem| refused(format!("{name}: {text:?}: {problem}")))
 }
 
 /// Of complex samples both parts are one.

@@ -1,6 +1,7 @@
 //! Of which converters captures come, and how their files are read.
 
 use crate::bank::{Bank, FrameLayout};
+use crate::io::table::TableOptions;
 use crate::io::{Coding, MultiReader, ReadOptions, StatedScale, TimeInterleaving};
 use crate::pipeline::matching::{self, InputMismatch, NotInTurn};
 use crate::quantity::FullScale;
@@ -8,7 +9,7 @@ use crate::spec::Spec;
 use crate::units::FastPeriods;
 
 /// What is said of files that do not state their format.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct FileFormat {
     /// The coding of the samples.
     pub coding: Coding,
@@ -20,16 +21,18 @@ pub struct FileFormat {
     pub is_iq: bool,
     /// Full scale of the converters.
     pub full_scale: Option<FullScale>,
+    /// How tables are read.
+    pub table: TableOptions,
 }
 
 impl FileFormat {
     /// Of so many files that together have `channels` channels.
     pub fn options(self, files: usize, channels: usize) -> ReadOptions<'static> {
-        let Self { coding, only, is_iq, full_scale, .. } = self;
+        let Self { coding, only, is_iq, full_scale, table, .. } = self;
         let usual = if files == 1 && only.is_none() { channels } else { 1 };
         let channels = self.channels.unwrap_or(usual);
         let scale = StatedScale { given: full_scale, ..StatedScale::default() };
-        ReadOptions { coding, channels, only, is_iq, scale, ..ReadOptions::files() }
+        ReadOptions { coding, channels, only, is_iq, scale, table, ..ReadOptions::files() }
     }
 }
 
@@ -103,9 +106,10 @@ impl Converters<'_> {
         files: usize,
         interleaving: Option<&'a TimeInterleaving>,
     ) -> ReadOptions<'a> {
+        let scale = self.scale(format.full_scale);
         let own = format.options(files, matching::channels_of_raw(&self.layout, files));
         let samples_per_frame = matching::samples_per_frame(&self.layout, files);
-        ReadOptions { interleaving, samples_per_frame, scale: self.scale(format.full_scale), ..own }
+        ReadOptions { interleaving, samples_per_frame, scale, ..own }
     }
 
     /// The files have the rates of the spec, or all channels and rates of the bank called `name`, whose

@@ -1,7 +1,7 @@
 //! FIR taps that other tools wrote.
 
 use super::layout::PolyphaseTaps;
-use crate::io::table::Table;
+use crate::io::table::{Table, TableOptions};
 use crate::io::{ArrayHeader, IoError, npy_header};
 use crate::messages::Quoted;
 
@@ -48,28 +48,21 @@ pub enum TapsError {
 /// # Errors
 /// [`TapsError`] with the line of the first cell that is wrong.
 pub fn taps_of_csv(bytes: &[u8]) -> Result<Vec<Vec<f64>>, TapsError> {
-    let mut table = Table::new(bytes, "", "a table of taps", BUFFER);
+    let options = TableOptions::default();
+    let mut table = Table::new(bytes, "", "a table of taps", &options, BUFFER).map_err(broken)?;
+    let places = table.columns();
+    let named = places.iter().zip(HEADINGS).filter(|(place, known)| table.name(**place) == *known);
+    let is_polyphase = named.count() == HEADINGS.len();
     let mut rows: Vec<Vec<f64>> = Vec::new();
-    let mut is_polyphase = false;
-    let mut width = None;
-    loop {
-        let cells = table.cells().map_err(broken)?;
-        if cells.is_empty() {
-            break;
-        }
-        let is_first = width.is_none();
-        if *width.get_or_insert(cells.len()) != cells.len() {
-            return Err(broken(table.fault(&format!("{} cells, unlike the lines before", cells.len()))));
-        }
-        if is_first && cells.iter().all(|cell| cell.parse::<f64>().is_err()) {
-            is_polyphase = cells.iter().zip(HEADINGS).filter(|(cell, known)| cell == known).count() == 4;
-            continue;
-        }
-        let number = |(column, text): (usize, &String)| match text.parse::<f64>() {
+    while table.next_row().map_err(broken)? {
+        let number = |column: &usize| match table.number(*column) {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(TapsError::NoNumber { line: table.line, column: column + 1, text: text.clone() }),
+            _ => {
+                let text = table.cell(*column).to_owned();
+                Err(TapsError::NoNumber { line: table.line(), column: column + 1, text })
+            }
         };
-        rows.push(cells.iter().enumerate().map(number).collect::<Result<_, _>>()?);
+        rows.push(places.iter().map(number).collect::<Result<_, _>>()?);
     }
     if is_polyphase { of_entries(&rows) } else { columns(&rows) }
 }

@@ -43,6 +43,7 @@ mod schema;
 mod simulate;
 #[cfg(unix)]
 mod stream;
+mod tables;
 mod understanding;
 mod usage;
 mod verify;

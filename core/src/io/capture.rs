@@ -102,11 +102,6 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Puts a block that is there.
-    pub(super) fn put(&mut self, bytes: Vec<u8>) {
-        self.bytes = bytes;
-    }
-
     /// Reads on; `refill` puts the next block into an empty vector, and leaves it empty at the end.
     pub(super) fn read<E: Into<io::Error>>(
         &mut self,

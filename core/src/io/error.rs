@@ -1,7 +1,7 @@
 //! Errors of reading and writing samples, and faults of inputs that are tolerated.
 
 use crate::files::FileError;
-use crate::messages::{Number, Quoted};
+use crate::messages::{Number, Quoted, counted};
 use crate::quantity::FullScale;
 use std::io;
 
@@ -117,6 +117,28 @@ pub enum InputFault {
     /// The file of samples of a SigMF recording has another digest than its metadata state.
     #[error("its samples do not have the core:sha512 of its metadata: they were changed or damaged later")]
     Altered,
+    /// The first column of a table was left out.
+    #[error(
+        "its first column is a steady ramp and was taken for the times or an index of the lines, not for a channel; state it \
+         (--time-column 1, or none if it is a channel)"
+    )]
+    RampLeftOut,
+    /// Times of a table lie several steps apart.
+    #[error("its times leave out {}; the samples there count as lost", counted(*.lines as usize, "line"))]
+    LinesMissing {
+        /// Number of these lines.
+        lines: u64,
+    },
+    /// The preamble of a table states another rate than that of its times.
+    #[error(
+        "its preamble states a rate of {} Hz, but its times have {} Hz, which was taken", Number(*.stated), Number(*.found)
+    )]
+    OtherRate {
+        /// The rate of the preamble in hertz.
+        stated: f64,
+        /// That of the times.
+        found: f64,
+    },
     /// The input ended before the last sample whose number at the converter is given.
     #[error("it ends before the last of the samples whose number is given")]
     TimestampsBeyondEnd,

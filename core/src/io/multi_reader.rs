@@ -79,6 +79,7 @@ impl MultiReader {
             only: options.only,
             is_iq: options.is_iq,
             scale: options.scale,
+            table: options.table.clone(),
             interleaving: interleaving.cloned(),
             per_frame: options.samples_per_frame.get(i).copied().unwrap_or(1),
             block,

@@ -2,13 +2,12 @@
 
 use super::byte_frames::ByteFrames;
 use super::capture::{ByteSource, Capture, open_file};
-use super::csv::CsvReader;
 use super::mat::{mat_variable, open_mat};
 use super::npy::open_npy;
 use super::pipe::{stdin_file, widen_pipe};
 use super::sigmf::is_sigmf;
 use super::sigmf_reader::SigmfReader;
-use super::table::is_table;
+use super::table::{TableOptions, TableReader, is_table};
 use super::wav::WavReader;
 use super::{Coding, IoError, PcmFormat, SampleLayout, StatedScale, StreamHeader, TimeInterleaving};
 use crate::messages::Quoted;
@@ -79,6 +78,8 @@ pub(super) struct InputSource {
     pub(super) is_iq: bool,
     /// What is said of its full scale.
     pub(super) scale: StatedScale,
+    /// How it is read if it is a table.
+    pub(super) table: TableOptions,
     /// Bytes of a block.
     pub(super) block: usize,
 }
@@ -112,7 +113,7 @@ impl InputSource {
         Ok(match Kind::of(path, self.coding) {
             Kind::Sigmf => Box::new(ByteFrames::new(SigmfReader::open(path)?)),
             Kind::Archive => return Err(unread(path, EXTRACT)),
-            Kind::Csv => Box::new(ByteFrames::new(CsvReader::new(self.stream()?, &name)?)),
+            Kind::Csv => Box::new(TableReader::new(self.stream()?, &name, &self.table)?),
             Kind::Npy => Box::new(ByteFrames::new(open_npy(open_file(path)?, &name)?)),
             Kind::Mat => {
                 let (file, variable) = mat_variable(path).unwrap_or_else(|| (path.to_owned(), None));
@@ -227,6 +228,7 @@ mod tests {
                 only: None,
                 is_iq: false,
                 scale: StatedScale::default(),
+                table: TableOptions::default(),
                 block: 4096,
             };
             let mut block = Block::default();

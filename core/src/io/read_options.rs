@@ -1,5 +1,6 @@
 //! Settings of the reading of several inputs.
 
+use super::table::TableOptions;
 use super::timestamps::MAX_LOST;
 use super::{Coding, LostSamples, StatedScale};
 use crate::runtime::Sample;
@@ -18,7 +19,7 @@ pub enum Until {
 }
 
 /// Settings of the reading.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct ReadOptions<'a> {
     /// Coding of all inputs except [those that state it](super::is_self_describing).
     pub coding: Coding,
@@ -30,6 +31,8 @@ pub struct ReadOptions<'a> {
     pub is_iq: bool,
     /// What is said of their full scale.
     pub scale: StatedScale,
+    /// How tables are read.
+    pub table: TableOptions,
     /// The time-interleaved converters of the only input, which has one channel then. Its frames are those
     /// of an input of M channels, at an M-th of its rate.
     pub interleaving: Option<&'a TimeInterleaving>,
@@ -56,6 +59,7 @@ impl ReadOptions<'_> {
             only: None,
             is_iq: false,
             scale: StatedScale::default(),
+            table: TableOptions::default(),
             interleaving: None,
             samples_per_frame: &[],
             lost: None,

@@ -96,6 +96,8 @@ pub struct StreamHeader {
     pub word: Option<Word>,
     /// Bits of the words that count, if the header states them.
     pub valid_bits: Option<u32>,
+    /// The first column of a table was left out as times or an index, because it is a steady ramp.
+    pub is_ramp_left_out: bool,
     /// Lowest and highest sample of integers and of codes; `None` for floats.
     pub rails: Option<(f64, f64)>,
 }
@@ -115,6 +117,7 @@ impl StreamHeader {
             is_scaled: false,
             word,
             valid_bits: None,
+            is_ramp_left_out: false,
             rails: word.map(Word::rails),
         }
     }

@@ -24,6 +24,10 @@ use crate::units::FastPeriods;
 /// The clocks of instruments differ by less.
 const MOST_CLOCK_ERROR: f64 = 1e-3;
 
+/// What is said of a table whose first column is no channel.
+const LEFT_OUT: &str =
+    " without the first column, a steady ramp like a time; if it is a channel, --time-column none";
+
 /// Recordings that do not fit a bank.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -212,8 +216,11 @@ pub fn check_channels(layout: &FrameLayout, name: &str, reader: &MultiReader) ->
     if given == wanted {
         return Ok(());
     }
-    let files: Vec<_> =
-        reader.headers().map(|(name, header)| format!("{}: {}", Quoted(name), header.channels)).collect();
+    let left_out = |header: &StreamHeader| if header.is_ramp_left_out { LEFT_OUT } else { "" };
+    let file = |(name, header): (&str, &StreamHeader)| {
+        format!("{}: {}{}", Quoted(name), header.channels, left_out(header))
+    };
+    let files: Vec<_> = reader.headers().map(file).collect();
     let (name, files) = (name.to_owned(), files.join(", "));
     if layout.is_plain() {
         return Err(InputMismatch::Channels { name, wanted, given, files });

@@ -23,6 +23,7 @@ fn reader(
         only: None,
         is_iq: false,
         scale: StatedScale::default(),
+        table: Default::default(),
         block: 4,
     }
     .raw_header();

@@ -1,0 +1,54 @@
+//! How tables are read.
+
+use hybank::io::table::{Column, Decimal, Delimiter, TableOptions, TimeColumn};
+
+/// Options of the commands that read tables.
+#[derive(Debug, Clone, clap::Args)]
+#[command(next_help_heading = "Tables")]
+pub(super) struct TableArgs {
+    /// Lines at the beginning of a table that are not looked at; a preamble is found without it
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    skip_lines: u64,
+    /// The columns of a table that are channels, by number from 1 or by heading: 2,3 or left,right
+    /// [default: all but the time]
+    #[arg(long, value_name = "C,..", value_delimiter = ',')]
+    columns: Vec<Column>,
+    /// The column of a table that says when each line was taken, by number or by heading, or none
+    /// [default: a first column that is called time, or that is a steady ramp]
+    #[arg(long, value_name = "C")]
+    time_column: Option<TimeColumn>,
+    /// What stands between the cells of a table: , ; tab or space [default: found]
+    #[arg(long, value_name = "D")]
+    delimiter: Option<Delimiter>,
+    /// The mark before the decimals in a table: point or comma [default: found]
+    #[arg(long, value_name = "MARK")]
+    decimal: Option<Decimal>,
+}
+
+impl TableArgs {
+    /// For the reader.
+    pub(super) fn options(&self) -> TableOptions {
+        TableOptions {
+            skip_lines: self.skip_lines,
+            delimiter: self.delimiter,
+            decimal: self.decimal,
+            columns: self.columns.clone(),
+            time: self.time_column.clone().unwrap_or_default(),
+            ..TableOptions::default()
+        }
+    }
+
+    /// What was given, as it is typed.
+    pub(super) fn typed(&self) -> String {
+        let quoted = |text: String| if text.contains(' ') { format!("\"{text}\"") } else { text };
+        let columns: Vec<String> = self.columns.iter().map(Column::to_string).collect();
+        let given = [
+            (self.skip_lines > 0).then(|| format!(" --skip-lines {}", self.skip_lines)),
+            (!columns.is_empty()).then(|| format!(" --columns {}", quoted(columns.join(",")))),
+            self.time_column.as_ref().map(|column| format!(" --time-column {}", quoted(column.to_string()))),
+            self.delimiter.map(|delimiter| format!(" --delimiter {delimiter}")),
+            self.decimal.map(|decimal| format!(" --decimal {decimal}")),
+        ];
+        given.into_iter().flatten().collect()
+    }
+}

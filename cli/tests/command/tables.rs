@@ -1,0 +1,107 @@
+//! Captures as tables that instruments and loggers wrote. As a user runs it.
+
+use crate::support::{Desk, channel, frames, fused, interleaved, text, wav};
+
+/// The two channels of a capture.
+fn channels(count: usize) -> (Vec<f32>, Vec<f32>) {
+    // Few digits, so that the text holds them all.
+    let both: Vec<f32> = frames(count).iter().map(|x| (x * 64.0).round() / 1024.0).collect();
+    (channel(&both, 0), channel(&both, 1))
+}
+
+/// A table with one line per frame.
+fn table(head: &str, samples: &[f32], line: impl Fn(usize, f32) -> String) -> String {
+    samples.iter().enumerate().fold(head.to_owned(), |table, (k, x)| table + &line(k, *x) + "\n")
+}
+
+#[test]
+fn files_of_an_oscilloscope_are_fused() {
+    let desk = Desk::new();
+    let (a, b) = channels(300);
+    let both =
+        table("x-axis,1,2\nsecond,Volt,Volt\n", &a, |k, x| format!("{:.6e},{x},{}", k as f64 * 1e-6, b[k]));
+    desk.write("scope.csv", both);
+    let rigol = |samples: &[f32]| {
+        let head = "X,CH1,Start,Increment,\nSequence,Volt,-2.0e-04,1.000000e-06\n";
+        table(head, samples, |k, x| format!("{k},{x:e},"))
+    };
+    desk.write("a.csv", rigol(&a));
+    desk.write("b.csv", rigol(&b));
+    let german = table("Zeit;A;B\n(ms);(V);(V)\n\n", &a, |_, x| format!("0;{x};0"));
+    desk.write("german.csv", german.replace('.', ","));
+    for inputs in [&["scope.csv"][..], &["a.csv", "b.csv"]] {
+        let said = desk.good(
+            &[&["fuse", "bank.json", "-o", "out.wav", "--keep-latency", "--force"][..], inputs].concat(),
+        );
+        assert!(wav::samples(&desk, "out.wav") == fused(&interleaved(&a, &b)), "{inputs:?}");
+        assert!(said.contains("2 MS/s"), "{inputs:?}: {said}");
+    }
+    let named =
+        ["fuse", "bank.json", "german.csv", "--columns", "A,B", "--time-column", "none", "-o", "named.wav"];
+    desk.good(&named);
+}
+
+#[test]
+fn bare_decimal_commas_are_refused_with_the_option() {
+    let desk = Desk::new();
+    let (a, b) = channels(300);
+    let bare = |samples: &[f32]| table("", samples, |_, x| format!("{x:.6}").replace('.', ","));
+    desk.write("a.csv", bare(&a));
+    desk.write("b.csv", bare(&b));
+    let fuse = ["fuse", "bank.json", "-o", "out.wav", "--keep-latency"];
+    desk.refused(1, &[&fuse[..], &["a.csv"]].concat(), &["a.csv", "decimal comma", "--decimal comma"]);
+    desk.good(&[&fuse[..], &["a.csv", "b.csv", "--decimal", "comma"]].concat());
+    assert!(wav::samples(&desk, "out.wav") == fused(&interleaved(&a, &b)));
+}
+
+#[test]
+fn a_first_column_that_is_a_ramp_is_said_or_refused() {
+    let desk = Desk::new();
+    let (a, b) = channels(300);
+    desk.write("three.csv", table("", &a, |k, x| format!("{k},{x},{}", b[k])));
+    desk.write("two.csv", table("", &a, |k, x| format!("{:.10},{x}", k as f64 / 1024.0)));
+    let fuse = ["fuse", "bank.json", "-o", "out.wav", "--keep-latency", "--force"];
+    let said = desk.run(&[&fuse[..], &["three.csv"]].concat(), &[]);
+    assert!(said.status.success() && text(&said.stderr).contains("steady ramp"), "{said:?}");
+    assert!(wav::samples(&desk, "out.wav") == fused(&interleaved(&a, &b)));
+    desk.refused(
+        1,
+        &[&fuse[..], &["two.csv"]].concat(),
+        &["two.csv: 1", "steady ramp", "--time-column none"],
+    );
+    desk.good(&[&fuse[..], &["two.csv", "--time-column", "none"]].concat());
+    let ramp: Vec<f32> = (0..300).map(|k| k as f32 / 1024.0).collect();
+    assert!(wav::samples(&desk, "out.wav") == fused(&interleaved(&ramp, &a)));
+    let strict = [&fuse[..], &["three.csv", "--strict"]].concat();
+    desk.refused(1, &strict, &["steady ramp"]);
+}
+
+#[test]
+fn times_are_judged_to_the_last_line() {
+    let desk = Desk::new();
+    let (a, b) = channels(3000);
+    let step = 1.0 / 24e3;
+    let line = |k: usize, x: f32| format!("{:.6},{x},{}", k as f64 * step, b[k]);
+    let whole = table("time,a,b\n", &a, line);
+    let without = |lost: usize| -> String {
+        let lines = whole.lines().enumerate().filter(|(k, _)| *k != lost);
+        lines.fold(String::new(), |table, (_, line)| table + line + "\n")
+    };
+    desk.write("lost.csv", without(2901));
+    desk.write("late.csv", whole.clone() + "0.125010,0,0\n");
+    desk.write("back.csv", whole.clone() + "0.001000,0,0\n");
+    let fuse = ["fuse", "bank.json", "-o", "out.wav", "--force"];
+    let report = desk.report(&[&fuse[..4], &["lost.csv"]].concat());
+    assert_eq!(report["samples"], 6000);
+    assert!(report["warnings"].to_string().contains("its times leave out 1 line"), "{report}");
+    desk.refused(
+        1,
+        &[&fuse[..], &["late.csv"]].concat(),
+        &["line 3002", "not evenly spaced", "hybank merge"],
+    );
+    desk.refused(1, &[&fuse[..], &["back.csv"]].concat(), &["line 3002", "before that of the line before"]);
+    // Times without the digits that show their step.
+    desk.write("coarse.csv", table("time,a\n", &a, |k, x| format!("{:.3},{x}", k as f64 * step)));
+    desk.refused(1, &["measure", "coarse.csv"], &["last digit of its time is 1 ms", "41.6"]);
+    desk.good(&["measure", "coarse.csv", "--rate", "24kHz"]);
+}

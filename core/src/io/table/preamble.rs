@@ -1,0 +1,244 @@
+//! Finds the first line of numbers, and what the lines before it say.
+
+use super::cells::{Cells, Numbers};
+use super::headings::{self, StatedRate};
+use super::options::{Column, Decimal, Delimiter, TableOptions, TimeColumn};
+use super::stamp::Stamp;
+use super::text::Lines;
+use crate::io::IoError;
+use crate::messages::{Quoted, counted};
+use std::collections::VecDeque;
+use std::io::Read;
+
+/// Most lines before the first one of numbers.
+const MOST_LINES: usize = 1000;
+/// Most lines of a table of headings alone.
+const HEADINGS: usize = 2;
+
+/// A line with its number, from 1.
+pub(super) type NumberedLine = (u64, Vec<u8>);
+
+/// What a table says before its numbers.
+#[derive(Default)]
+pub(super) struct Preamble {
+    pub(super) layout: Layout,
+    /// The first lines of numbers.
+    pub(super) ahead: VecDeque<NumberedLine>,
+    /// How many of them have words of the preamble in the columns that hold nothing.
+    pub(super) beside: usize,
+    /// Headings, and the cells below them where there is a line of units; as many as the first line of
+    /// numbers has cells.
+    pub(super) names: Vec<String>,
+    pub(super) units: Vec<String>,
+    pub(super) stated: Option<StatedRate>,
+    /// Columns that hold nothing and have no heading, as after a delimiter at the end of each line.
+    pub(super) blank: Vec<bool>,
+}
+
+/// How lines are split, and the columns that the options name.
+#[derive(Clone)]
+pub(super) struct Layout {
+    pub(super) delimiter: Delimiter,
+    pub(super) chosen: Vec<usize>,
+    pub(super) time: Option<usize>,
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        Self { delimiter: Delimiter::Comma, chosen: Vec::new(), time: None }
+    }
+}
+
+impl Preamble {
+    /// Reads up to the first line of numbers, or to the end.
+    pub(super) fn read<R: Read>(lines: &mut Lines<R>, options: &TableOptions) -> Result<Self, IoError> {
+        let mut skipped: Vec<NumberedLine> = Vec::new();
+        loop {
+            let Some(line) = lines.next()? else { return Self::of_headings(lines, &skipped, options) };
+            let line = line.to_vec();
+            let line = (lines.number, line);
+            let Some(layout) = layout_of(&line.1, &skipped, options) else {
+                skipped.push(line);
+                if skipped.len() == MOST_LINES {
+                    return Err(lines.fault(&no_numbers(skipped.len(), options)));
+                }
+                continue;
+            };
+            let mut ahead = VecDeque::from([line]);
+            // A line at hand tells whether the numbers are part of the preamble.
+            if lines.is_more_at_hand()
+                && let Some(next) = lines.next()?.map(<[u8]>::to_vec)
+            {
+                let is_headings = is_headings(&next, &ahead[0].1, layout.delimiter);
+                ahead.push_back((lines.number, next));
+                if is_headings {
+                    skipped.extend(ahead);
+                    continue;
+                }
+            }
+            return Ok(Self::found(layout, skipped, ahead));
+        }
+    }
+
+    /// A table without numbers: empty, or none at all.
+    fn of_headings<R: Read>(
+        lines: &Lines<R>,
+        skipped: &[NumberedLine],
+        options: &TableOptions,
+    ) -> Result<Self, IoError> {
+        if skipped.len() > HEADINGS || options.columns.iter().any(is_name) {
+            return Err(lines.fault(&no_numbers(skipped.len(), options)));
+        }
+        let Some((_, line)) = skipped.last() else { return Ok(Self::default()) };
+        let has = |delimiter: &Delimiter| line.contains(&delimiter.byte());
+        let delimiter = Delimiter::ALL.into_iter().find(has).unwrap_or(Delimiter::Comma);
+        let names = split(line, options.delimiter.unwrap_or(delimiter));
+        let units = vec![String::new(); names.len()];
+        Ok(Self { blank: vec![false; names.len()], names, units, ..Self::default() })
+    }
+
+    fn found(layout: Layout, mut skipped: Vec<NumberedLine>, mut ahead: VecDeque<NumberedLine>) -> Self {
+        let delimiter = layout.delimiter;
+        let first = split(&ahead[0].1, delimiter);
+        let plain = ahead.len();
+        if layout.chosen.is_empty() {
+            while skipped.last().is_some_and(|line| is_beside(&split(&line.1, delimiter), &first)) {
+                ahead.extend(skipped.pop());
+                ahead.rotate_right(1);
+            }
+        }
+        let cells: Vec<Vec<String>> = skipped.iter().map(|(_, line)| split(line, delimiter)).collect();
+        let (mut names, mut units) = headings_of(&cells, first.len());
+        names.iter_mut().filter(|name| headings::is_of_preamble(name)).for_each(String::clear);
+        names.resize(first.len(), String::new());
+        units.resize(first.len(), String::new());
+        let is_blank = |(cell, name): (&String, &String)| cell.is_empty() && name.is_empty();
+        let blank = first.iter().zip(&names).map(is_blank).collect();
+        let words = if delimiter == Delimiter::Space { Delimiter::Comma } else { delimiter };
+        let beside = ahead.len() - plain;
+        let preamble = skipped.iter().chain(ahead.iter().take(beside));
+        let cells: Vec<Vec<String>> = preamble.map(|(_, line)| split(line, words)).collect();
+        Self { layout, ahead, beside, names, units, stated: headings::stated_rate(&cells), blank }
+    }
+}
+
+/// What is said of a table in which no numbers were found.
+fn no_numbers(lines: usize, options: &TableOptions) -> String {
+    let names: Vec<String> =
+        options.columns.iter().filter(|column| is_name(column)).map(Column::to_string).collect();
+    let named = match names.as_slice() {
+        [] => String::new(),
+        names => format!(" in columns called {}", Quoted(names.join(", "))),
+    };
+    format!(
+        "no line of numbers{named} among {}; give one column per channel and one line per frame, with cells \
+         separated by , ; tab or space",
+        counted(lines, "line")
+    )
+}
+
+fn is_name(column: &Column) -> bool {
+    matches!(column, Column::Name(_))
+}
+
+fn split(line: &[u8], delimiter: Delimiter) -> Vec<String> {
+    let mut cells = Cells::new(delimiter);
+    cells.split(line);
+    cells.iter().map(str::to_owned).collect()
+}
+
+/// How a line of numbers is split; `None` if it is none.
+fn layout_of(line: &[u8], before: &[NumberedLine], options: &TableOptions) -> Option<Layout> {
+    if line.starts_with(b"#") {
+        return None;
+    }
+    let with_commas = options.decimal == Some(Decimal::Comma);
+    let may_be = |delimiter: &Delimiter| match options.delimiter {
+        Some(given) => *delimiter == given,
+        None => !(with_commas && *delimiter == Delimiter::Comma),
+    };
+    let single = if with_commas { Delimiter::Semicolon } else { Delimiter::Comma };
+    let several = |delimiter: &Delimiter| split(line, *delimiter).len() > 1;
+    let candidates = Delimiter::ALL.into_iter().filter(may_be).filter(several);
+    candidates.chain([options.delimiter.unwrap_or(single)]).find_map(|delimiter| {
+        let layout = Layout::resolve(delimiter, before, options)?;
+        layout.is_row(&split(line, delimiter), options).then_some(layout)
+    })
+}
+
+impl Layout {
+    /// The columns that the options name, by the headings in the lines before; `None` if one is not there.
+    fn resolve(delimiter: Delimiter, before: &[NumberedLine], options: &TableOptions) -> Option<Self> {
+        let place = |column: &Column| match column {
+            Column::Number(number) => Some(*number),
+            Column::Name(name) => before.iter().rev().find_map(|(_, line)| {
+                split(line, delimiter).iter().position(|cell| cell.eq_ignore_ascii_case(name))
+            }),
+        };
+        let chosen = options.columns.iter().map(place).collect::<Option<_>>()?;
+        let time = match &options.time {
+            TimeColumn::Is(column) => Some(place(column)?),
+            TimeColumn::Found | TimeColumn::None => None,
+        };
+        Some(Self { delimiter, chosen, time })
+    }
+
+    /// True for cells that are numbers, one at least, where samples are; the time may be a date.
+    fn is_row(&self, cells: &[String], options: &TableOptions) -> bool {
+        let time = self.time.unwrap_or(0);
+        let may_be_date = options.time != TimeColumn::None;
+        let columns: Vec<usize> = match self.chosen.as_slice() {
+            [] => (0..cells.len()).collect(),
+            chosen => chosen.iter().copied().chain(self.time).collect(),
+        };
+        let mut numbers = Numbers { decimal: options.decimal };
+        let mut count = 0;
+        let mut is_held = |column: &usize| {
+            let Some(cell) = cells.get(*column) else { return false };
+            if may_be_date && *column == time && Stamp::parse(cell).is_some_and(|stamp| stamp.is_date) {
+                return true;
+            }
+            let number = numbers.read(cell);
+            count += usize::from(number.is_some_and(f64::is_finite));
+            number.is_some()
+        };
+        columns.iter().all(&mut is_held) && count > 0
+    }
+}
+
+/// True for a line of words only, with another number of cells than the line of numbers before it.
+fn is_headings(line: &[u8], before: &[u8], delimiter: Delimiter) -> bool {
+    let cells = split(line, delimiter);
+    if cells.is_empty() || line.starts_with(b"#") {
+        return false;
+    }
+    let is_word =
+        |cell: &String| Numbers { decimal: None }.read(cell).is_none() && Stamp::parse(cell).is_none();
+    cells.len() != split(before, delimiter).len() && cells.iter().all(is_word)
+}
+
+/// True for a line with numbers where `first` has them, and words where it has nothing: the preamble stands
+/// beside the numbers.
+fn is_beside(cells: &[String], first: &[String]) -> bool {
+    let mut pairs = first.iter().enumerate().filter(|(_, cell)| !cell.is_empty());
+    let is_number = |cell: &String| Numbers { decimal: None }.read(cell).is_some_and(f64::is_finite);
+    first.iter().any(String::is_empty) && pairs.all(|(column, _)| cells.get(column).is_some_and(is_number))
+}
+
+/// The headings of so many columns, and the line of units below them. Both are the last lines with cells,
+/// or a comment that has as many.
+fn headings_of(lines: &[Vec<String>], columns: usize) -> (Vec<String>, Vec<String>) {
+    let is_comment = |cells: &&Vec<String>| cells[0].starts_with('#');
+    let mut last = lines.iter().rev().filter(|cells| !cells.iter().all(String::is_empty));
+    let mut plain = last.clone().filter(|cells| !is_comment(cells));
+    match (plain.next(), plain.next()) {
+        (Some(units), Some(names)) if headings::is_of_units(&units[0]) => (names.clone(), units.clone()),
+        (Some(names), _) => (names.clone(), Vec::new()),
+        (None, _) => {
+            let comment = last.find(|cells| columns > 1 && cells.len() == columns);
+            let mut names = comment.cloned().unwrap_or_default();
+            names.iter_mut().take(1).for_each(|name| *name = name.trim_start_matches(['#', ' ']).to_owned());
+            (names, Vec::new())
+        }
+    }
+}
