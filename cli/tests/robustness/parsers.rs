@@ -97,10 +97,9 @@ fn tables_and_arrays_of_samples() {
             return refusals += 1;
         };
         // Lines that are missing by the times are NaN, and may be many.
-        let (mut held, mut reads, mut some) = (0, 0, [0; 24]);
-        while let Some(count) = answered(reader.read(&mut some)).filter(|count| *count > 0 && reads < 1000) {
-            let samples = some[..count].as_chunks().0.iter().map(|sample| f64::from_le_bytes(*sample));
-            held += samples.filter(|sample| !sample.is_nan()).count();
+        let (mut held, mut reads) = (0, 0);
+        while let Some(frame) = answered(reader.next_frame()).flatten().filter(|_| reads < 1000) {
+            held += frame.iter().filter(|sample| !sample.is_nan()).count();
             reads += 1;
         }
         answers += reads;
