@@ -3,7 +3,7 @@
 use super::bank_file::load_spec_or_bank;
 use super::print::{Failure, InFile, show, warn};
 use super::virtual_converters::{CommonReport, ConverterReport, ErrorArgs, bad_error, integers};
-use super::virtual_signal::{Signal, SignalArgs};
+use super::virtual_signal::{DescribedSignal, SignalArgs};
 use super::written::{Mono, begin_recording, check_outputs, write_together};
 use hybank::design::Problem;
 use hybank::io::{Container, PcmFormat, SampleWriter, is_same_rate};
@@ -102,7 +102,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let errors = args.errors.errors();
     let truth = errors.true_spec(&spec).map_err(|refused| bad_error(&refused))?;
     let problem = Problem::new(&Spec { signal: None, ..truth }, spec.wait()).in_file(&args.spec)?;
-    let signal = Signal::read(&args.signal, &spec)?;
+    let signal = DescribedSignal::read(&args.signal, &spec)?;
     let kind = args.kind(signal.is_complex())?;
     let (rates, mut warnings) = Rates::of(&spec, kind).in_file(&args.spec)?;
     warnings.extend(signal.warning(&spec));
@@ -155,7 +155,7 @@ type Parts = (Vec<f64>, Option<Vec<f64>>);
 struct Run<'a> {
     args: &'a Args,
     problem: &'a Problem,
-    signal: &'a Signal,
+    signal: &'a DescribedSignal,
     frames: usize,
 }
 

@@ -31,7 +31,7 @@ impl SignalArgs {
 }
 
 /// An analog signal in normalised time.
-pub(super) struct Signal {
+pub(super) struct DescribedSignal {
     pub(super) analog: simulate::Signal,
     /// As it was understood.
     pub(super) text: String,
@@ -39,7 +39,7 @@ pub(super) struct Signal {
     pub(super) given: String,
 }
 
-impl Signal {
+impl DescribedSignal {
     /// From --source and --imaginary.
     pub(super) fn read(args: &SignalArgs, spec: &Spec) -> Result<Self, Failure> {
         let reader = Reader { args, spec };

@@ -1,7 +1,7 @@
 //! How well samples are predicted from those around them: a trial of a model by the recordings themselves.
 
 use super::around::Around;
-use super::estimator::{Estimator, Sample};
+use super::estimator::{Estimator, TimedSample};
 use super::recording::Recording;
 use hybank_core::units::FastPeriods;
 use hybank_linalg::{LinalgError, Mat, PositiveFactor, dot};
@@ -31,7 +31,7 @@ pub struct Trials {
 
 #[derive(Debug, Clone)]
 struct Trial {
-    samples: Vec<Sample>,
+    samples: Vec<TimedSample>,
     values: Vec<f64>,
     /// Those that are left out.
     nearest: Vec<usize>,
@@ -82,7 +82,7 @@ impl Trial {
         let around = Around::new(recordings, origin..origin, reach, within);
         let (nearest, Around { samples, values, .. }) = (around.nearest(), around);
         // Sounds come and go, noise stays.
-        let gain = |sample: &Sample| estimator.signals().converters()[sample.converter].gain;
+        let gain = |sample: &TimedSample| estimator.signals().converters()[sample.converter].gain;
         let squares = samples.iter().zip(&values).map(|(sample, value)| (value / gain(sample)).powi(2));
         let level = squares.sum::<f64>() / (values.len().max(1) as f64 * power);
         let signal = estimator.signal_covariances(&samples);

@@ -7,7 +7,7 @@
 //! a ten thousandth of a period, which no look at the middle would find.
 
 use super::demand::Outputs;
-use super::estimator::{Estimator, MeanSquare, Sample, Taps};
+use super::estimator::{Estimator, EstimatorTaps, MeanSquare, TimedSample};
 use super::fusion::Grid;
 use super::recording::Recording;
 use hybank_core::units::FastPeriods;
@@ -37,7 +37,7 @@ pub(super) struct Stretch<'a> {
 #[derive(Clone)]
 struct Knot {
     frame: usize,
-    taps: Taps,
+    taps: EstimatorTaps,
 }
 
 impl<'a> Stretch<'a> {
@@ -70,12 +70,12 @@ impl<'a> Stretch<'a> {
     }
 
     /// All samples for a frame, with instants relative to it.
-    fn samples(&self, frame: usize) -> Vec<Sample> {
+    fn samples(&self, frame: usize) -> Vec<TimedSample> {
         let origin = self.grid.frame(frame);
         let of = |i: usize| {
             self.numbers(i, frame).map(move |number| {
                 let sample = self.recordings[i].sample(number);
-                Sample { instant: sample.instant - origin, ..sample }
+                TimedSample { instant: sample.instant - origin, ..sample }
             })
         };
         (0..self.recordings.len()).flat_map(of).collect()

@@ -7,8 +7,8 @@ use crate::results::{Made, record};
 use crate::sources;
 use crate::values::frequencies;
 use hybank::calibrate::{
-    self as calibration, Calibration, CalibrationSignal, ChannelEstimate, Fit, Fitting, Settings, Tone,
-    Warning, applied,
+    self as calibration, Calibration, CalibrationSignal, CalibrationTone, ChannelEstimate, Fit, Fitting,
+    Settings, Warning, applied,
 };
 use hybank::sine_fit::Estimate;
 use hybank::spec::Spec;
@@ -122,7 +122,7 @@ fn result<'py>(py: Python<'py>, spec: &Spec, found: &Calibration) -> PyResult<Bo
         made = made.with(name, column(|found| found.value))?;
         made = made.with(&format!("{name}_sigma"), column(|found| found.sigma))?;
     }
-    let tone = |tone: &Tone| ToneReport {
+    let tone = |tone: &CalibrationTone| ToneReport {
         frequency: tone.frequency,
         zone: tone.zone,
         amplitude: tone.amplitude.value,

@@ -3,7 +3,7 @@
 use crate::arrays::matrix;
 use crate::background;
 use crate::errors::refused;
-use hybank::bank::{Bank, StateSpace, SynthesisFilters};
+use hybank::bank::{Bank, StateMatrices, SynthesisFilters};
 use hybank::design;
 use hybank::design::responses::{fir_response, impulse_responses};
 use hybank::units::Hertz;
@@ -78,7 +78,7 @@ pub(crate) fn state_space<'py>(py: Python<'py>, bank: &Bank) -> PyResult<Matrice
         )));
     }
     let filters = design::filters::lifted(&bank.filters, bank.ratio);
-    let StateSpace { a, b, c, d } = design::filters::to_block(&filters);
+    let StateMatrices { a, b, c, d } = design::filters::to_block(&filters);
     let (states, channels) = (a.len(), bank.frame_samples());
     Ok((matrix(py, a, states)?, matrix(py, b, channels)?, matrix(py, c, states)?, matrix(py, d, channels)?))
 }

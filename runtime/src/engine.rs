@@ -6,7 +6,7 @@
 
 #[cfg(feature = "rayon")]
 use crate::adapters::SplitOutput;
-use crate::adapters::{Input, Output};
+use crate::adapters::{InputFrames, OutputFrames};
 use crate::algorithms::{Direct, Facts, Filter, OverlapSave, Recursive};
 use crate::sample::Sample;
 use crate::state::{Count, Numbers};
@@ -18,19 +18,19 @@ pub(crate) enum Engine {
     F32(Fir<f32>),
     F64(Fir<f64>),
     /// A recursion feeds its rounding errors back: always in f64.
-    Recursive(Running<Recursive>),
+    Recursive(StatefulFilter<Recursive>),
 }
 
 /// One of the algorithms for FIR filters.
 #[derive(Debug, Clone)]
 pub(crate) enum Fir<T: Sample> {
-    Direct(Running<Direct<T>>),
-    OverlapSave(Running<OverlapSave<T>>),
+    Direct(StatefulFilter<Direct<T>>),
+    OverlapSave(StatefulFilter<OverlapSave<T>>),
 }
 
 /// Coefficients, which streams share, and a state that they made.
 #[derive(Debug)]
-pub(crate) struct Running<F: Filter> {
+pub(crate) struct StatefulFilter<F: Filter> {
     filter: Arc<F>,
     state: F::State,
 }
@@ -60,7 +60,7 @@ impl Engine {
     }
 
     /// See [`Filter::process`].
-    pub(crate) fn process(&mut self, input: &dyn Input, output: &mut dyn Output) -> u64 {
+    pub(crate) fn process(&mut self, input: &dyn InputFrames, output: &mut dyn OutputFrames) -> u64 {
         each!(self, it => it.filter.process(&mut it.state, input, output))
     }
 
@@ -68,7 +68,7 @@ impl Engine {
     #[cfg(feature = "rayon")]
     pub(crate) fn process_parallel(
         &mut self,
-        input: &dyn Input,
+        input: &dyn InputFrames,
         output: &mut dyn SplitOutput,
         pool: &crate::ThreadPool,
     ) -> u64 {
@@ -110,18 +110,18 @@ impl Engine {
     }
 }
 
-fn reset<F: Filter>(running: &mut Running<F>) {
+fn reset<F: Filter>(running: &mut StatefulFilter<F>) {
     F::reset(&mut running.state);
 }
 
-impl<F: Filter> Running<F> {
+impl<F: Filter> StatefulFilter<F> {
     /// At its beginning.
     pub(crate) fn new(filter: F) -> Self {
         Self { state: filter.state(), filter: Arc::new(filter) }
     }
 }
 
-impl<F: Filter> Clone for Running<F> {
+impl<F: Filter> Clone for StatefulFilter<F> {
     fn clone(&self) -> Self {
         Self { filter: Arc::clone(&self.filter), state: self.state.clone() }
     }

@@ -1,6 +1,6 @@
 #![doc = include_str!("../README.md")]
 //!
-//! Samples need not be interleaved: [`Stream::run`] takes any [`Input`] and gives to any [`Output`], such as
+//! Samples need not be interleaved: [`Stream::run`] takes any [`InputFrames`] and gives to any [`OutputFrames`], such as
 //! a slice per channel ([`Planar`]) and recordings as they lie in files ([`PcmFrames`], [`PcmOutput`]).
 //! Complex samples (IQ) are two streams through one plan, one for the real parts and one for the imaginary
 //! ones, which [`PcmFrames::part`] and `PcmOutput::part` pick out by a stride.
@@ -53,9 +53,11 @@ mod stream;
 #[cfg(test)]
 mod tests;
 
-pub use adapters::{Frames, Halves, Input, Interleaved, Output, PcmOutput, Planar, SplitOutput, Zeros};
+pub use adapters::{
+    Frames, Halves, InputFrames, Interleaved, OutputFrames, PcmOutput, Planar, SplitOutput, Zeros,
+};
 pub use algorithms::choice::{Algorithm, ParseAlgorithmError, Precision};
-pub use algorithms::recursive::{DelayLines, DelayedInput, StateSpace};
+pub use algorithms::recursive::{DelayLines, DelayedInput, StateMatrices};
 pub use error::{BuildError, ProcessError, StateError};
 #[cfg(feature = "rayon")]
 pub use parallel::ThreadPool;

@@ -2,7 +2,7 @@
 
 #[cfg(feature = "rayon")]
 use crate::adapters::SplitOutput;
-use crate::adapters::{Input, Interleaved, Output, WithoutOffsets, Zeros};
+use crate::adapters::{InputFrames, Interleaved, OutputFrames, WithoutOffsets, Zeros};
 use crate::engine::Engine;
 use crate::state::{Count, Header, Numbers};
 use crate::{Plan, ProcessError, Sample, StateError};
@@ -100,7 +100,11 @@ impl Stream {
     ///
     /// # Errors
     /// As [`Stream::process`].
-    pub fn run(&mut self, input: &dyn Input, output: &mut dyn Output) -> Result<usize, ProcessError> {
+    pub fn run(
+        &mut self,
+        input: &dyn InputFrames,
+        output: &mut dyn OutputFrames,
+    ) -> Result<usize, ProcessError> {
         let frames = self.check(input, output)?;
         self.replaced += match self.plan.offsets() {
             Some(offsets) => self.engine.process(&WithoutOffsets { input, offsets }, output),
@@ -120,7 +124,7 @@ impl Stream {
     #[cfg(feature = "rayon")]
     pub fn run_parallel(
         &mut self,
-        input: &dyn Input,
+        input: &dyn InputFrames,
         output: &mut dyn SplitOutput,
         pool: &crate::ThreadPool,
     ) -> Result<usize, ProcessError> {
@@ -138,7 +142,7 @@ impl Stream {
     ///
     /// # Errors
     /// [`ProcessError::OutputTooShort`]; nothing is processed then.
-    pub fn flush(&mut self, output: &mut dyn Output) -> Result<usize, ProcessError> {
+    pub fn flush(&mut self, output: &mut dyn OutputFrames) -> Result<usize, ProcessError> {
         let zeros = Zeros { channels: self.channels(), frames: self.plan.flush_frames() };
         let frames = self.check(&zeros, output)?;
         // Zeros without offsets: what no converter delivered.
@@ -196,7 +200,7 @@ impl Stream {
     }
 
     /// The frames of a call, if everything fits.
-    fn check(&self, input: &dyn Input, output: &dyn Output) -> Result<usize, ProcessError> {
+    fn check(&self, input: &dyn InputFrames, output: &dyn OutputFrames) -> Result<usize, ProcessError> {
         if input.channels() != self.channels() {
             return Err(ProcessError::Channels { given: input.channels(), wanted: self.channels() });
         }

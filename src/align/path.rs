@@ -68,7 +68,7 @@ pub(super) struct Disagree {
 }
 
 /// The pieces of the reference on all lines.
-pub(super) struct Search<'a> {
+pub(super) struct PathSearch<'a> {
     reference: &'a Record,
     other: &'a Record,
     length: usize,
@@ -80,7 +80,7 @@ pub(super) struct Search<'a> {
     lags: Vec<Vec<Option<LocalLag>>>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> PathSearch<'a> {
     /// Of a recording that lies near a line, where samples are whole, and near others parallel to it.
     pub(super) fn new(reference: &'a Record, other: &'a Record, line: LagLine) -> Self {
         let frames = reference.samples.len();

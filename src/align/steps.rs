@@ -4,7 +4,7 @@
 //! it fit the reference best at the one lag, and those after it at the other.
 
 use super::clock::Step;
-use super::path::{Disagree, Known, Path, Search, median};
+use super::path::{Disagree, Known, Path, PathSearch, median};
 use crate::calibrate::{LagLine, Record, interpolated, stretch};
 use crate::simulate::Instants;
 use crate::units::FastPeriods;
@@ -77,7 +77,7 @@ struct Jump {
 
 /// Finds the steps of a recording that lies near a line.
 pub(super) fn mended(reference: &Record, other: &Record, line: LagLine) -> Result<Placed, Disagree> {
-    let path = Search::new(reference, other, line).known()?;
+    let path = PathSearch::new(reference, other, line).known()?;
     let jumps = jumps(&path);
     let mut steps: Vec<Step> = Vec::new();
     for jump in &jumps {

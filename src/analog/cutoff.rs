@@ -14,7 +14,7 @@
 //! G(x) - G(0) - x G'(0).
 
 use super::AnalogError;
-use super::realise::{Block, Chain};
+use super::realise::{Chain, SeriesBlock};
 use super::roots::Roots;
 use super::section::{Realisation, Section};
 use crate::arithmetic::{Ball, Float512};
@@ -38,13 +38,13 @@ impl CutoffRemainder {
     pub(crate) fn new(filter: &FilterSpec, h: Seconds, error: f64) -> Result<Option<Self>, AnalogError> {
         let Chain { gain, blocks } = Chain::<Long>::new(filter, h)?;
         let sections = blocks.into_iter().map(|block| match block {
-            Block::Section(section) => Some(section),
-            Block::State(_) => None,
+            SeriesBlock::Section(section) => Some(section),
+            SeriesBlock::State(_) => None,
         });
         let Some(sections) = sections.collect::<Option<Vec<Section<Long>>>>() else { return Ok(None) };
         let share = beyond_first_order(&sections, Ball::from(error));
         let damped = |section: Section<Long>| Section { zeros: damped(section.zeros), ..section };
-        let blocks = sections.into_iter().map(damped).map(Block::Section).collect();
+        let blocks = sections.into_iter().map(damped).map(SeriesBlock::Section).collect();
         Ok(share.map(|share| Self { filter: Chain { gain, blocks }.realise(), share }))
     }
 }

@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 
 /// One block of a series, with one input and one output.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Block<T> {
+pub(super) enum SeriesBlock<T> {
     /// One or two poles with at most as many zeros.
     Section(Section<T>),
     /// State equations as the spec gives them.
@@ -26,7 +26,7 @@ pub(super) enum Block<T> {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Chain<T> {
     pub(super) gain: T,
-    pub(super) blocks: Vec<Block<T>>,
+    pub(super) blocks: Vec<SeriesBlock<T>>,
 }
 
 /// A number in which written filters are realised: `f64` for the design, a ball for the proof.
@@ -65,7 +65,7 @@ fn without_leading_zeros(values: &[f64]) -> &[f64] {
     &values[start..]
 }
 
-impl<T: Written> Block<T> {
+impl<T: Written> SeriesBlock<T> {
     pub(super) fn realise(&self) -> Realisation<T> {
         match self {
             Self::Section(section) => section.realise(),
@@ -74,7 +74,7 @@ impl<T: Written> Block<T> {
     }
 }
 
-impl Block<f64> {
+impl SeriesBlock<f64> {
     pub(super) fn response(&self, s: Complex<f64>) -> Complex<f64> {
         match self {
             Self::Section(section) => section.response(s),
@@ -139,7 +139,7 @@ impl<T: Written> Chain<T> {
     fn of_sections(factors: Factors<T>) -> Self {
         let sections = pair_sections(&factors.poles, &factors.zeros);
         let gain = sections.iter().fold(factors.gain, |gain, section| section.unscaled(gain));
-        Self { gain, blocks: sections.into_iter().map(Block::Section).collect() }
+        Self { gain, blocks: sections.into_iter().map(SeriesBlock::Section).collect() }
     }
 
     fn of_matrices(a: &[Vec<f64>], b: &[Vec<f64>], c: &[Vec<f64>], h: T) -> Self {
@@ -150,16 +150,16 @@ impl<T: Written> Chain<T> {
             c: DMatrix::from_fn(1, n, |_, j| T::from(c[0][j])),
             d: T::from(0.0),
         };
-        Self { gain: T::from(1.0), blocks: vec![Block::State(state)] }
+        Self { gain: T::from(1.0), blocks: vec![SeriesBlock::State(state)] }
     }
 
     /// H(s / factor), a positive number.
     pub(super) fn stretched(&self, factor: T) -> Self {
-        let stretched = |block: &Block<T>| match block {
-            Block::Section(Section { poles, zeros }) => {
-                Block::Section(Section { poles: poles.scaled(factor), zeros: zeros.scaled(factor) })
+        let stretched = |block: &SeriesBlock<T>| match block {
+            SeriesBlock::Section(Section { poles, zeros }) => {
+                SeriesBlock::Section(Section { poles: poles.scaled(factor), zeros: zeros.scaled(factor) })
             }
-            Block::State(state) => Block::State(state.stretched(factor)),
+            SeriesBlock::State(state) => SeriesBlock::State(state.stretched(factor)),
         };
         Self { gain: self.gain, blocks: self.blocks.iter().map(stretched).collect() }
     }

@@ -24,7 +24,7 @@ pub struct Calibration {
     /// The part of the front ends whose cut-offs were fitted.
     pub cutoff: Option<Cutoff>,
     /// The tones, if there were any.
-    pub tones: Vec<Tone>,
+    pub tones: Vec<CalibrationTone>,
     /// Delays are known modulo this, if tones were used and leave a second value within a thousand periods
     /// of the highest one.
     pub modulus: Option<FastPeriods>,
@@ -54,7 +54,7 @@ pub struct ChannelEstimate {
 
 /// A tone that was used.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tone {
+pub struct CalibrationTone {
     /// Its analog frequency.
     pub frequency: Estimate<Hertz>,
     /// Its Nyquist zone of the slow rate, from 1: zone z lies between (z - 1)/2 and z/2 of the rate.
@@ -71,7 +71,7 @@ pub(super) struct Fitted {
     pub(super) covariance: Mat,
     /// o_i.
     pub(super) offsets: Option<Vec<Estimate<f64>>>,
-    pub(super) tones: Vec<Tone>,
+    pub(super) tones: Vec<CalibrationTone>,
     pub(super) modulus: Option<FastPeriods>,
     /// Square root of chi squared per degree of freedom, if it could be judged.
     pub(super) misfit: Option<f64>,

@@ -55,7 +55,7 @@ mod waveform;
 pub use agreement::{Agreement, ENOUGH_FRAMES, Verdict, agreement, comparable, frames_for_agreement};
 pub use contradiction::Contradiction;
 pub use error::CalibrateError;
-pub use estimates::{Calibration, ChannelEstimate, Tone, applied};
+pub use estimates::{Calibration, CalibrationTone, ChannelEstimate, applied};
 pub use fit::Fit;
 pub(crate) use lags::{Correlation, LagLine, interpolated, line, steadied, stretch};
 pub(crate) use model::Model;

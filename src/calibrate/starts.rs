@@ -81,7 +81,7 @@ pub(super) fn starts(model: &Model, records: &[Record]) -> Option<Starts> {
         return None;
     }
     let captures = records.iter().map(|record| &record.samples[first..first + frames]).collect();
-    let search = Search { model, nominal: Point::nominal(model, Fit::default(), 0), captures, frames };
+    let search = StartSearch { model, nominal: Point::nominal(model, Fit::default(), 0), captures, frames };
     let nominal = search.judged(vec![0; records.len()], vec![1.0; records.len()])?;
     if nominal.unexplained <= UNEXPLAINED_SHARE {
         return Some(nominal);
@@ -92,14 +92,14 @@ pub(super) fn starts(model: &Model, records: &[Record]) -> Option<Starts> {
     Some(if is_clear { found } else { nominal })
 }
 
-struct Search<'a> {
+struct StartSearch<'a> {
     model: &'a Model,
     nominal: Point,
     captures: Vec<&'a [f64]>,
     frames: usize,
 }
 
-impl Search<'_> {
+impl StartSearch<'_> {
     /// The nominal starts changed channel by channel as long as that explains more; `None` if a channel has
     /// several starts that explain the captures alike.
     fn improved(&self, nominal: &Starts) -> Option<Starts> {

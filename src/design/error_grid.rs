@@ -8,7 +8,7 @@ use super::DesignError;
 use super::filters;
 use super::plant::LiftedPlant;
 use crate::linalg::{self, CMat, Mat};
-use crate::lmi::sampled::{Point, Taps};
+use crate::lmi::sampled::{FrequencyPoint, Taps};
 use crate::lti::peak::{Peak, local_maxima, refine};
 use std::f64::consts::PI;
 use std::sync::OnceLock;
@@ -41,7 +41,7 @@ pub(super) trait AffineError {
     type Scenario: Clone + PartialEq + std::fmt::Debug;
 
     /// W and H at a location.
-    fn at(&self, location: &Location<Self::Scenario>) -> Point;
+    fn at(&self, location: &Location<Self::Scenario>) -> FrequencyPoint;
 
     /// The local maxima of `sigma_max(K)` over the frequencies for the unknowns `taps`, in any order. Those
     /// up to `level` may be left out.
@@ -84,7 +84,7 @@ fn coarse_intervals(lags: usize) -> usize {
 pub(super) struct ErrorGrid<'a> {
     plant: &'a LiftedPlant,
     frequencies: Frequencies,
-    points: Vec<OnceLock<Point>>,
+    points: Vec<OnceLock<FrequencyPoint>>,
 }
 
 /// Frequencies from 0 to pi.
@@ -131,12 +131,12 @@ impl<'a> ErrorGrid<'a> {
     }
 
     /// All points.
-    pub(super) fn points(&self) -> Vec<Point> {
+    pub(super) fn points(&self) -> Vec<FrequencyPoint> {
         (0..self.frequencies.all.len()).map(|k| self.point(k).clone()).collect()
     }
 
     /// The coarser points that suffice for a mean square, with their trapezoidal weights.
-    pub(super) fn coarse(&self) -> (Vec<Point>, Vec<f64>) {
+    pub(super) fn coarse(&self) -> (Vec<FrequencyPoint>, Vec<f64>) {
         let last = self.frequencies.uniform.len() / FINE;
         let at = |k: usize| self.point(self.frequencies.uniform[k * FINE]).clone();
         let mut weights = vec![1.0 / last as f64; last + 1];
@@ -191,7 +191,7 @@ impl<'a> ErrorGrid<'a> {
         self.point(k).error(&filters::response(taps, self.frequencies.all[k]))
     }
 
-    fn point(&self, k: usize) -> &Point {
+    fn point(&self, k: usize) -> &FrequencyPoint {
         self.points[k].get_or_init(|| self.plant.at(self.frequencies.all[k]))
     }
 }
@@ -199,7 +199,7 @@ impl<'a> ErrorGrid<'a> {
 impl AffineError for ErrorGrid<'_> {
     type Scenario = ();
 
-    fn at(&self, location: &Location<()>) -> Point {
+    fn at(&self, location: &Location<()>) -> FrequencyPoint {
         self.plant.at(location.frequency)
     }
 

@@ -25,7 +25,7 @@ use super::error_grid::{AffineError, Location};
 use super::limits::Stop;
 use crate::linalg;
 use crate::lmi::FINEST_GAP;
-use crate::lmi::sampled::{self, LowerBound, MeanSquareObjective, Point, Problem, Taps};
+use crate::lmi::sampled::{self, FrequencyPoint, LowerBound, MeanSquareObjective, SampledProblem, Taps};
 
 /// Relative width of the interval `[lower, gamma]` at which the exchange ends.
 pub(crate) const GAMMA_ACCURACY: f64 = 5e-7;
@@ -83,7 +83,7 @@ impl Tolerances {
 
 /// Unknowns with what their error peaks at.
 #[derive(Debug, Clone)]
-pub(super) struct Candidate<S> {
+pub(super) struct ExchangeCandidate<S> {
     /// `F_j`, M x N.
     pub(super) taps: Taps,
     /// Estimate of their gamma; equal to gamma if no peak was missed.
@@ -94,7 +94,7 @@ pub(super) struct Candidate<S> {
 
 /// The solution on the points.
 struct Round<S> {
-    candidate: Candidate<S>,
+    candidate: ExchangeCandidate<S>,
     is_solved: bool,
 }
 
@@ -104,7 +104,7 @@ pub(super) struct Exchange<E: AffineError> {
     /// The error that is minimised. The points stay when its scenarios are refined, so known ones must not
     /// change.
     pub(super) error: E,
-    problem: Problem,
+    problem: SampledProblem,
     /// Of the points of the problem, in the order in which they were added.
     pub(super) locations: Vec<Location<E::Scenario>>,
     /// Added points have the weight zero.
@@ -128,7 +128,7 @@ impl<E: AffineError> Exchange<E> {
     /// [`LEAST_MARGIN`].
     pub(super) fn new(
         error: E,
-        problem: Problem,
+        problem: SampledProblem,
         scenarios: impl IntoIterator<Item = E::Scenario>,
         objective: MeanSquareObjective,
         gamma_margin: f64,
@@ -156,7 +156,7 @@ impl<E: AffineError> Exchange<E> {
     ///
     /// # Errors
     /// [`DesignError`] if a decomposition does not converge.
-    pub(super) fn optimise(&mut self) -> Result<Candidate<E::Scenario>, DesignError> {
+    pub(super) fn optimise(&mut self) -> Result<ExchangeCandidate<E::Scenario>, DesignError> {
         self.optimise_at(Tolerances::steady(GAMMA_ACCURACY))
     }
 
@@ -167,7 +167,7 @@ impl<E: AffineError> Exchange<E> {
     pub(super) fn optimise_at(
         &mut self,
         tolerances: Tolerances,
-    ) -> Result<Candidate<E::Scenario>, DesignError> {
+    ) -> Result<ExchangeCandidate<E::Scenario>, DesignError> {
         let least = self.minimise_gamma(tolerances)?;
         self.leave_out_inactive(&least, tolerances.active)?;
         self.minimise_mean_square(least, tolerances)
@@ -182,13 +182,16 @@ impl<E: AffineError> Exchange<E> {
             }
         }
         let added = &self.locations[known..];
-        let points: Vec<Point> = added.iter().map(|location| self.error.at(location)).collect();
+        let points: Vec<FrequencyPoint> = added.iter().map(|location| self.error.at(location)).collect();
         self.objective.weights.extend(std::iter::repeat_n(0.0, added.len()));
         self.problem = self.problem.with_points(points);
         known < self.locations.len()
     }
 
-    fn minimise_gamma(&mut self, tolerances: Tolerances) -> Result<Candidate<E::Scenario>, DesignError> {
+    fn minimise_gamma(
+        &mut self,
+        tolerances: Tolerances,
+    ) -> Result<ExchangeCandidate<E::Scenario>, DesignError> {
         let mut tolerance = tolerances.tolerance(f64::INFINITY);
         let mut last = self.round(tolerances, tolerance)?;
         let mut best = last.candidate.clone();
@@ -227,7 +230,11 @@ impl<E: AffineError> Exchange<E> {
 
     /// Leaves out the added points where the gain of `start` is below a share of its gamma. If the secondary
     /// objective raises the gain there, it is a peak and becomes a point again.
-    fn leave_out_inactive(&mut self, start: &Candidate<E::Scenario>, share: f64) -> Result<(), DesignError> {
+    fn leave_out_inactive(
+        &mut self,
+        start: &ExchangeCandidate<E::Scenario>,
+        share: f64,
+    ) -> Result<(), DesignError> {
         if share == 0.0 {
             return Ok(());
         }
@@ -244,7 +251,7 @@ impl<E: AffineError> Exchange<E> {
         }
         self.objective.weights = weights;
         self.locations = locations;
-        self.problem = Problem::new(points, self.problem.lags().to_vec());
+        self.problem = SampledProblem::new(points, self.problem.lags().to_vec());
         Ok(())
     }
 
@@ -252,9 +259,9 @@ impl<E: AffineError> Exchange<E> {
     /// `start` if the interior-point method makes no progress from there.
     fn minimise_mean_square(
         &mut self,
-        start: Candidate<E::Scenario>,
+        start: ExchangeCandidate<E::Scenario>,
         tolerances: Tolerances,
-    ) -> Result<Candidate<E::Scenario>, DesignError> {
+    ) -> Result<ExchangeCandidate<E::Scenario>, DesignError> {
         let cap = start.estimate * (1.0 + self.gamma_margin);
         let cap_at_points = start.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
         for _ in 0..tolerances.rounds {
@@ -285,11 +292,16 @@ impl<E: AffineError> Exchange<E> {
 
     /// The taps with the peaks of their error. None is searched once the design is stopped: `gamma`, that of
     /// the points, stands for them.
-    fn judge(&self, taps: Taps, gamma: f64, level: f64) -> Result<Candidate<E::Scenario>, DesignError> {
+    fn judge(
+        &self,
+        taps: Taps,
+        gamma: f64,
+        level: f64,
+    ) -> Result<ExchangeCandidate<E::Scenario>, DesignError> {
         let peaks = if self.stop.is_due() { Vec::new() } else { self.error.peaks(&taps, level)? };
         let estimate = peaks.iter().map(|peak| peak.gain).fold(gamma, f64::max);
         let above = peaks.into_iter().filter(|peak| peak.gain > level).map(|peak| peak.location).collect();
-        Ok(Candidate { taps, estimate, above })
+        Ok(ExchangeCandidate { taps, estimate, above })
     }
 
     fn raise_lower_bound(&mut self, lower: LowerBound) {

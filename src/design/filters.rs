@@ -111,7 +111,7 @@ pub fn check_stable(bank: &Bank) -> Result<(), DesignError> {
     }
 }
 
-fn from_block(block: &bank::StateSpace, ratio: usize) -> StateSpace {
+fn from_block(block: &bank::StateMatrices, ratio: usize) -> StateSpace {
     let (n, channels) = (block.a.len(), block.d.first().map_or(0, Vec::len));
     let matrix = |rows: &[Vec<f64>], r: usize, c: usize| Mat::from_fn(r, c, |i, j| rows[i][j]);
     StateSpace::new(
@@ -123,9 +123,9 @@ fn from_block(block: &bank::StateSpace, ratio: usize) -> StateSpace {
 }
 
 /// A system as a bank holds it: lists of rows.
-pub fn to_block(system: &StateSpace) -> bank::StateSpace {
+pub fn to_block(system: &StateSpace) -> bank::StateMatrices {
     let rows = |m: &Mat| m.row_iter().map(|row| row.iter().copied().collect()).collect();
-    bank::StateSpace { a: rows(system.a()), b: rows(system.b()), c: rows(system.c()), d: rows(system.d()) }
+    bank::StateMatrices { a: rows(system.a()), b: rows(system.b()), c: rows(system.c()), d: rows(system.d()) }
 }
 
 #[cfg(test)]
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn unstable_recursions_are_refused_and_fir_banks_never_are() {
-        let block = |pole: f64| bank::StateSpace {
+        let block = |pole: f64| bank::StateMatrices {
             a: vec![vec![pole]],
             b: vec![vec![1.0]],
             c: vec![vec![1.0]],

@@ -31,14 +31,14 @@ const LENGTHENINGS: usize = 16;
 /// A figure of a bank that a spec may ask for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Figure {
+pub enum TargetFigure {
     /// Power of the target over that of error and noise.
     Snr,
     /// Distance of the largest image of a tone.
     Sfdr,
 }
 
-impl fmt::Display for Figure {
+impl fmt::Display for TargetFigure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Snr => "SNR",
@@ -51,7 +51,7 @@ impl fmt::Display for Figure {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Goal {
     /// A figure of at least so many decibels.
-    AtLeast(Figure, f64),
+    AtLeast(TargetFigure, f64),
     /// The largest image of a bank that is made for samples without noise lies [`BELOW_NOISE_DB`] below the
     /// noise in the band; or more taps bring nothing.
     BelowNoise,
@@ -60,8 +60,8 @@ pub(super) enum Goal {
 impl Goal {
     /// What `spec` asks for.
     pub(super) fn of(spec: &Spec) -> Self {
-        let snr = spec.design.target_snr_db.map(|wanted| Self::AtLeast(Figure::Snr, wanted));
-        let sfdr = || spec.design.target_sfdr_db.map(|wanted| Self::AtLeast(Figure::Sfdr, wanted));
+        let snr = spec.design.target_snr_db.map(|wanted| Self::AtLeast(TargetFigure::Snr, wanted));
+        let sfdr = || spec.design.target_sfdr_db.map(|wanted| Self::AtLeast(TargetFigure::Sfdr, wanted));
         snr.or_else(sfdr).unwrap_or(Self::BelowNoise)
     }
 }
@@ -145,7 +145,7 @@ impl<'a> Lengths<'a> {
     fn lengthened(
         &self,
         BankSize { mut taps, mut latency }: BankSize,
-        figure: Figure,
+        figure: TargetFigure,
         wanted: f64,
         comparison: Comparison<'_>,
     ) -> Result<BankSize, DesignError> {
@@ -191,7 +191,7 @@ impl<'a> Lengths<'a> {
             Goal::AtLeast(figure, wanted) => (figure, wanted),
             Goal::BelowNoise => {
                 let noise = decibels(errors.zero_output() / errors.noise_of(&filters, &self.noise));
-                (Figure::Sfdr, noise + BELOW_NOISE_DB)
+                (TargetFigure::Sfdr, noise + BELOW_NOISE_DB)
             }
         };
         Ok(self.figure(errors, &filters, size.latency, figure)? >= wanted)
@@ -203,9 +203,9 @@ impl<'a> Lengths<'a> {
         errors: &FirErrors,
         filters: &[Vec<f64>],
         latency: usize,
-        figure: Figure,
+        figure: TargetFigure,
     ) -> Result<f64, DesignError> {
-        if figure == Figure::Snr {
+        if figure == TargetFigure::Snr {
             return Ok(decibels(errors.zero_output() / errors.square_of(filters, latency)));
         }
         let plain = Problem { latency, signal: None, ..self.problem.clone() };

@@ -8,7 +8,7 @@ use super::merging::Repeats;
 use super::problem::Problem;
 use crate::bank::{Gamma, SynthesisFilters};
 use crate::linalg::{self, CMat, Complex, Mat};
-use crate::lmi::sampled::Point;
+use crate::lmi::sampled::FrequencyPoint;
 use crate::lti::gramian::h2_norm;
 use crate::lti::peak::{
     Peak, hinf_norm, hinf_norm_with_response, resonances, stable_poles, unexplained_peak,
@@ -162,10 +162,10 @@ impl LiftedPlant {
 
     /// H and W at e^{j omega}, omega in radians per slow period. The columns are compressed to at
     /// most N + M, which keeps `[H; W] [H; W]*`.
-    pub fn at(&self, omega: f64) -> Point {
+    pub fn at(&self, omega: f64) -> FrequencyPoint {
         let g = linalg::lq_factor(&self.at_frequency(omega));
         let (n, m) = (self.channels(), self.ratio());
-        Point { omega, h: g.rows(0, n).into_owned(), w: g.rows(n, m).into_owned() }
+        FrequencyPoint { omega, h: g.rows(0, n).into_owned(), w: g.rows(n, m).into_owned() }
     }
 
     /// ||K|| with the frequency at which it is attained, radians per slow period.

@@ -123,7 +123,7 @@ pub fn error_response(bank: &Bank, points: usize) -> Result<Vec<(Hertz, f64)>, D
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bank::StateSpace;
+    use crate::bank::StateMatrices;
     use std::f64::consts::TAU;
 
     /// The sum over 20,000 aliases on either side; the rest is below (0.5 / (2 pi 20,000))^3.
@@ -149,7 +149,7 @@ mod tests {
     #[test]
     fn a_recursion_has_the_impulse_response_of_its_closed_form() {
         // y[k] = sum_j 0.5^j x[k - j] at phase 0, the input itself at phase 1.
-        let block = StateSpace {
+        let block = StateMatrices {
             a: vec![vec![0.5]],
             b: vec![vec![0.5]],
             c: vec![vec![1.0], vec![0.0]],

@@ -17,7 +17,7 @@
 use super::deviations::Deviations;
 use super::problem::Problem;
 use super::quadrature::{Integrand, Node};
-use super::signal::Signal;
+use super::signal::SampledSignal;
 use crate::linalg::{self, CMat, Complex, Mat};
 use std::ops::RangeInclusive;
 
@@ -52,7 +52,7 @@ impl RootCovariance {
         instants: RangeInclusive<i64>,
     ) -> Self {
         let problem = Problem { latency: 0, ..problem.clone() };
-        let signal = Signal::of(&problem);
+        let signal = SampledSignal::of(&problem);
         let nodes = integrand(&problem, &signal, frames, &instants);
         let mut columns = RootColumns::new(&problem, frames, instants.clone());
         for node in nodes {
@@ -144,7 +144,12 @@ impl PartialHistory<'_> {
     }
 }
 
-fn integrand(problem: &Problem, signal: &Signal, frames: usize, instants: &RangeInclusive<i64>) -> Vec<Node> {
+fn integrand(
+    problem: &Problem,
+    signal: &SampledSignal,
+    frames: usize,
+    instants: &RangeInclusive<i64>,
+) -> Vec<Node> {
     let ratio = problem.ratio as f64;
     let oldest = -problem.longest_delay().0 - frames as f64 * ratio;
     let reach = (*instants.end() as f64).max(0.0) - oldest.min(*instants.start() as f64);
@@ -180,7 +185,7 @@ impl RootColumns {
 
     /// Adds what the signal gives at a node. An LQ factorisation leaves the samples no more columns than
     /// channels.
-    fn add(&mut self, signal: &Signal, deviations: &[Deviations], node: Node) {
+    fn add(&mut self, signal: &SampledSignal, deviations: &[Deviations], node: Node) {
         let columns = signal.at(node.theta).with_errors(signal.problem(), deviations);
         let channels = self.sizes.len();
         let stacked =

@@ -24,7 +24,7 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// A signal that reaches the samples of a problem.
 #[derive(Debug, Clone)]
-pub(crate) struct Signal {
+pub(crate) struct SampledSignal {
     problem: Problem,
     /// The frequencies that it occupies with unit density, radians per fast period. `None`: all.
     band: Option<RangeInclusive<f64>>,
@@ -59,7 +59,7 @@ pub(crate) struct Columns {
     pub(crate) reference: CMat,
 }
 
-impl Signal {
+impl SampledSignal {
     /// That of `problem`: white noise of unit density in its band, or through the filter of its signal at
     /// all frequencies.
     pub(crate) fn of(problem: &Problem) -> Self {

@@ -3,7 +3,7 @@
 
 use super::integral::mean_over_circle;
 use super::reconstruction::Reconstruction;
-use crate::design::{Columns, Deviations, Signal};
+use crate::design::{Columns, Deviations, SampledSignal};
 use crate::linalg::{CMat, Complex};
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ const ANGLES: std::ops::RangeInclusive<f64> = 120.0..=40_000.0;
 /// What a mean square error is computed for.
 pub(super) struct Conditions {
     /// The signal.
-    pub(super) signal: Signal,
+    pub(super) signal: SampledSignal,
     /// s_i^2 of each channel, in the scale of the signal.
     pub(super) noise: Vec<f64>,
     /// How far each converter is from the spec; offsets are in the scale of the signal.
@@ -38,7 +38,7 @@ pub(super) struct Powers {
 }
 
 /// The mean square of the target.
-pub(super) fn target_power(signal: &Signal) -> f64 {
+pub(super) fn target_power(signal: &SampledSignal) -> f64 {
     let work = signal.columns() * signal.problem().ratio;
     let breaks = even_and(signal.breaks());
     let power =

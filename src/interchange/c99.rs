@@ -3,7 +3,7 @@
 use super::ExportError;
 use super::bit_true::IntegerFilters;
 use super::layout::{PolyphaseTaps, sparse_rows};
-use crate::bank::{Bank, FixedPoint, StateSpace, SynthesisFilters};
+use crate::bank::{Bank, FixedPoint, StateMatrices, SynthesisFilters};
 
 /// Numbers per line of a table.
 const PER_LINE: usize = 4;
@@ -235,7 +235,7 @@ fn fir(parts: &Fir<'_>) -> String {
     )
 }
 
-fn recursive(bank: &Bank, block: &StateSpace, name: &str) -> String {
+fn recursive(bank: &Bank, block: &StateMatrices, name: &str) -> String {
     let (rows, states) = (sparse_rows(block), block.a.len());
     let (inputs, outputs) = (bank.frame_samples(), bank.ratio);
     let starts: Vec<usize> = std::iter::once(0)

@@ -1,7 +1,7 @@
 //! The amplitudes of lines, and what is left without them.
 
 use super::expected::{Expected, Pattern, unexpected};
-use super::record::Record;
+use super::record::RecordParts;
 use super::{Cause, MeasureError};
 use crate::sine_fit::{Direction, SineFit, alias, find_tones, fit, fit_known};
 use crate::units::{Decibels, Hertz};
@@ -35,7 +35,7 @@ pub(super) struct Found {
 pub(super) struct Lines {
     pub(super) found: Vec<Found>,
     /// What is left without tones, constant and lines; 0 where a sample is missing.
-    pub(super) rest: Record<'static>,
+    pub(super) rest: RecordParts<'static>,
     /// Variance of the noise of a part.
     pub(super) noise_power: f64,
     /// Amplitude above which a line counts as a spur.
@@ -45,7 +45,7 @@ pub(super) struct Lines {
 /// Fits all expected lines together with the tones, whose frequencies are known, and searches the rest for
 /// more.
 pub(super) fn fit_lines(
-    record: &Record<'_>,
+    record: &RecordParts<'_>,
     tones: &SineFit,
     expected: &Expected,
     pattern: &Pattern<'_>,
@@ -81,7 +81,7 @@ pub(super) fn fit_lines(
 
 impl Lines {
     /// Of what a fit of so many parameters to so many samples leaves.
-    fn new(found: Vec<Found>, rest: Record<'static>, used: usize, parameters: usize) -> Self {
+    fn new(found: Vec<Found>, rest: RecordParts<'static>, used: usize, parameters: usize) -> Self {
         let noise_power = rest.energy() / used.saturating_sub(parameters).max(1) as f64;
         let log_probability = SIGNIFICANCE + (found.len().max(1) as f64).ln();
         let values = (used * rest.parts().len()) as f64;
@@ -97,13 +97,13 @@ struct Together {
     /// a of the line (-1)^n a, for each part.
     half_rate: Vec<f64>,
     /// What is left.
-    rest: Record<'static>,
+    rest: RecordParts<'static>,
 }
 
 impl Together {
     /// The lines disturb the first fit of the tones, so these are fitted again in what is left without
     /// lines.
-    fn fit(record: &Record<'_>, tones: &SineFit, expected: &Expected) -> Result<Self, MeasureError> {
+    fn fit(record: &RecordParts<'_>, tones: &SineFit, expected: &Expected) -> Result<Self, MeasureError> {
         let rate = tones.rate;
         let mut found: Vec<Hertz> = tones.frequencies.iter().map(|f| f.value).collect();
         let lines = found.len()..found.len() + expected.lines.len();
@@ -132,7 +132,7 @@ impl Together {
     }
 
     /// The expected lines, and in complex records the images of the tones.
-    fn found(&self, record: &Record<'_>, pattern: &Pattern<'_>, expected: &Expected) -> Vec<Found> {
+    fn found(&self, record: &RecordParts<'_>, pattern: &Pattern<'_>, expected: &Expected) -> Vec<Found> {
         let (rate, tones) = (self.fit.rate, pattern.tones.len());
         let tones_of_images = (0..tones).filter(|_| pattern.is_complex);
         let images = tones_of_images.map(|k| Found {
@@ -177,17 +177,17 @@ struct Unexpected {
     found: Vec<Found>,
     /// The sum of those that are apart from tones and expected lines. What is left of a line beside it is
     /// that line's own.
-    waves: Record<'static>,
+    waves: RecordParts<'static>,
     /// The largest amplitude of these.
     largest: f64,
     /// What is left without any of them.
-    rest: Record<'static>,
+    rest: RecordParts<'static>,
 }
 
 impl Unexpected {
     /// Fits and subtracts the largest lines of the rest, one after the other; those of complex records with
     /// what is at minus their frequency.
-    fn search(rest: &Record<'static>, rate: Hertz, pattern: &Pattern<'_>, expected: &Expected) -> Self {
+    fn search(rest: &RecordParts<'static>, rate: Hertz, pattern: &Pattern<'_>, expected: &Expected) -> Self {
         let waves = rest.map(|_, part| vec![0.0; part.len()]);
         let mut all = Self { found: Vec::new(), waves, largest: 0.0, rest: rest.clone() };
         for _ in 0..MOST_UNEXPECTED {

@@ -2,7 +2,7 @@
 
 use super::expected::{Expected, Pattern};
 use super::lines::{Found, Lines, fit_lines};
-use super::record::{Quadrature, Record, UnsettledEnds};
+use super::record::{Quadrature, RecordParts, UnsettledEnds};
 use super::{Cause, MeasureError, Settings, Spectrum, Window};
 use crate::sine_fit::SineFitError::{AtEdge, NoTone, TonesCoincide};
 use crate::sine_fit::{Direction, Estimate, SineFit, ToneFit, find_tones, fit, locate, with_lines};
@@ -35,7 +35,7 @@ pub struct Measurement {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadrature: Option<Quadrature>,
     /// The tones.
-    pub tones: Vec<Tone>,
+    pub tones: Vec<MeasuredTone>,
     /// Signal over everything else but the constant.
     #[serde(rename = "sinad_db")]
     pub sinad: Decibels,
@@ -89,7 +89,7 @@ impl Measurement {
 
 /// A fitted tone.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Tone {
+pub struct MeasuredTone {
     /// In its own Nyquist zone; in complex records with its sign.
     #[serde(rename = "frequency_hertz")]
     pub frequency: Estimate<Hertz>,
@@ -133,7 +133,7 @@ pub fn measure(samples: &[f64], rate: Hertz, settings: &Settings) -> Result<Meas
         let rule = "give a frequency above 0, for only complex samples tell its sign";
         return Err(MeasureError::Setting { setting: "a tone of a real record", value: tone.0, rule });
     }
-    measured(&Record::real(samples), rate, settings)
+    measured(&RecordParts::real(samples), rate, settings)
 }
 
 /// Measures a complex record of one or several tones e^{2 pi j f t}, each with the sign of its frequency.
@@ -152,10 +152,10 @@ pub fn measure_complex(
         let (setting, value) = ("the number of imaginary parts", imaginary.len() as f64);
         return Err(MeasureError::Setting { setting, value, rule: "there is one for each real part" });
     }
-    measured(&Record::complex(real, imaginary), rate, settings)
+    measured(&RecordParts::complex(real, imaginary), rate, settings)
 }
 
-fn measured(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
+fn measured(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
     settings.check()?;
     match figures(record, rate, settings) {
         // A peak that is searched for may be a trend, which no sine fits.
@@ -168,7 +168,7 @@ fn measured(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Mea
     }
 }
 
-fn figures(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
+fn figures(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
     let tones = fit_tones(record, rate, settings)?;
     let cycles: Vec<f64> = tones.frequencies.iter().map(|f| f.value / rate).collect();
     let pattern = Pattern {
@@ -187,7 +187,7 @@ fn figures(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Meas
 
 /// The tones and, in complex records, their images. The largest tone of a complex record has the sign of its
 /// larger exponential.
-fn fit_tones(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<SineFit, MeasureError> {
+fn fit_tones(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Result<SineFit, MeasureError> {
     let channels = record.channels();
     let found = fit(&channels, rate, &starts(record, rate, settings)?)
         .map_err(|error| with_lines(error, &channels, rate))?;
@@ -200,7 +200,7 @@ fn fit_tones(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Si
 }
 
 /// Frequencies at which the fit begins.
-fn starts(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Vec<Hertz>, MeasureError> {
+fn starts(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Result<Vec<Hertz>, MeasureError> {
     let channels = record.channels();
     if settings.tones.is_empty() {
         return Ok(find_tones(&channels, rate, 1, Decibels(0.0))?);
@@ -210,7 +210,7 @@ fn starts(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Vec<H
     settings.tones.iter().map(start).collect()
 }
 
-fn spectrum(record: &Record<'_>, rate: Hertz, window: Window) -> Spectrum {
+fn spectrum(record: &RecordParts<'_>, rate: Hertz, window: Window) -> Spectrum {
     match record.parts() {
         [real, imaginary] => Spectrum::complex(real, imaginary, rate, window),
         parts => Spectrum::new(&parts[0], rate, window),
@@ -219,7 +219,7 @@ fn spectrum(record: &Record<'_>, rate: Hertz, window: Window) -> Spectrum {
 
 /// What the figures are computed from.
 struct Figures<'a> {
-    record: &'a Record<'a>,
+    record: &'a RecordParts<'a>,
     pattern: &'a Pattern<'a>,
     tones: &'a SineFit,
     lines: &'a Lines,
@@ -303,11 +303,11 @@ impl Figures<'_> {
         self.amplitudes().fold(0.0, f64::max)
     }
 
-    fn tones(&self) -> Vec<Tone> {
+    fn tones(&self) -> Vec<MeasuredTone> {
         let rate = self.tones.rate;
         let tone = |(k, frequency): (usize, &Estimate<Hertz>)| {
             let ToneFit { amplitude, phase } = self.tone(k);
-            Tone {
+            MeasuredTone {
                 frequency: *frequency,
                 alias: rate * self.pattern.seen(frequency.value / rate),
                 amplitude,
@@ -349,7 +349,7 @@ impl Figures<'_> {
     }
 
     /// The samples without their constant; the fitted tones where one is missing.
-    fn completed(&self) -> Record<'static> {
+    fn completed(&self) -> RecordParts<'static> {
         self.record.map(|i, part| {
             let offset = self.tones.channels[i].constant.value;
             if part.iter().all(|x| x.is_finite()) {

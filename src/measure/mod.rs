@@ -51,7 +51,7 @@ mod warning;
 
 pub use compare::{Band, Comparison, compare};
 pub use expected::Cause;
-pub use measurement::{Measurement, Spur, Tone, measure, measure_complex};
+pub use measurement::{MeasuredTone, Measurement, Spur, measure, measure_complex};
 pub use record::{Imbalance, Quadrature, UnsettledEnds};
 pub use spectrum::{Spectrum, Window};
 pub use warning::Warning;

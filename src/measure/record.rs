@@ -13,12 +13,12 @@ const RAISED_POWER: f64 = 4.0;
 /// The samples of a record. Powers are means over its parts, so that those of a tone of the amplitude A are
 /// A^2 / 2 for both kinds.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Record<'a> {
+pub(super) struct RecordParts<'a> {
     /// The real samples, or the real and the imaginary parts, which are of one length.
     parts: Vec<Cow<'a, [f64]>>,
 }
 
-impl<'a> Record<'a> {
+impl<'a> RecordParts<'a> {
     pub(super) fn real(samples: &'a [f64]) -> Self {
         Self { parts: vec![Cow::Borrowed(samples)] }
     }
@@ -58,26 +58,26 @@ impl<'a> Record<'a> {
     }
 
     /// The same of each part, which is given with its number.
-    pub(super) fn map(&self, change: impl Fn(usize, &[f64]) -> Vec<f64>) -> Record<'static> {
+    pub(super) fn map(&self, change: impl Fn(usize, &[f64]) -> Vec<f64>) -> RecordParts<'static> {
         let parts = self.parts.iter().enumerate();
-        Record { parts: parts.map(|(i, part)| Cow::Owned(change(i, part))).collect() }
+        RecordParts { parts: parts.map(|(i, part)| Cow::Owned(change(i, part))).collect() }
     }
 
     /// With zeros in place of missing samples.
-    pub(super) fn filled(&self) -> Record<'static> {
+    pub(super) fn filled(&self) -> RecordParts<'static> {
         self.map(|_, part| part.iter().map(|x| if x.is_finite() { *x } else { 0.0 }).collect())
     }
 
-    pub(super) fn plus(&self, other: &Record<'_>) -> Record<'static> {
+    pub(super) fn plus(&self, other: &RecordParts<'_>) -> RecordParts<'static> {
         self.map(|i, part| part.iter().zip(other.parts[i].iter()).map(|(x, y)| x + y).collect())
     }
 
-    pub(super) fn minus(&self, other: &Record<'_>) -> Record<'static> {
+    pub(super) fn minus(&self, other: &RecordParts<'_>) -> RecordParts<'static> {
         self.map(|i, part| part.iter().zip(other.parts[i].iter()).map(|(x, y)| x - y).collect())
     }
 
     /// What a fit leaves.
-    pub(super) fn residual(&self, fit: &SineFit) -> Record<'static> {
+    pub(super) fn residual(&self, fit: &SineFit) -> RecordParts<'static> {
         self.map(|i, part| fit.residual(i, part))
     }
 

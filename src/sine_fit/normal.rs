@@ -69,7 +69,7 @@ pub(super) fn accumulate(channel: &Channel<'_>, point: &Point<'_>) -> NormalEqua
     let columns = point.linear.len() + point.unit.map_or(0, |_| point.oscillators.len());
     let mut normal = NormalEquations::new(columns);
     let is_whole = point.unit.is_none() && channel.used() == channel.samples.len();
-    let mut block = Block { columns: vec![0.0; columns * BLOCK], residual: vec![0.0; BLOCK] };
+    let mut block = JacobianBlock { columns: vec![0.0; columns * BLOCK], residual: vec![0.0; BLOCK] };
     for first in (0..channel.samples.len()).step_by(BLOCK) {
         normal.rows += block.load(channel, point, first);
         for i in 0..columns {
@@ -126,12 +126,12 @@ fn sum_of_cosines(cycles: f64, samples: usize) -> f64 {
 }
 
 /// The columns of J and r for [`BLOCK`] samples, zero after the end of the record.
-struct Block {
+struct JacobianBlock {
     columns: Vec<f64>,
     residual: Vec<f64>,
 }
 
-impl Block {
+impl JacobianBlock {
     fn column(&self, i: usize) -> &[f64] {
         &self.columns[i * BLOCK..(i + 1) * BLOCK]
     }

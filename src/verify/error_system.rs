@@ -11,7 +11,7 @@ use super::ball::{self, Ball, Matrix};
 use super::slow_period::SlowPeriod;
 use super::system::EnclosedSystem;
 use crate::arithmetic::{DoubleDouble, Number};
-use crate::bank::{StateSpace, SynthesisFilters};
+use crate::bank::{StateMatrices, SynthesisFilters};
 use crate::linalg;
 use std::ops::Range;
 
@@ -76,7 +76,7 @@ impl<F: Number> BlockForm<F> {
         form
     }
 
-    fn from_block(block: &StateSpace, ratio: usize) -> Self {
+    fn from_block(block: &StateMatrices, ratio: usize) -> Self {
         let (states, channels) = (block.a.len(), block.d[0].len());
         let matrix = |rows: &[Vec<f64>], r, c| Matrix::from_fn(r, c, |i, j| Ball::from(rows[i][j]));
         Self {

@@ -4,7 +4,7 @@
 use super::spectrum;
 use super::*;
 use crate::arithmetic::{ComplexBall, DoubleDouble};
-use crate::bank::{Certificate, Gamma, StateSpace, SynthesisFilters};
+use crate::bank::{Certificate, Gamma, StateMatrices, SynthesisFilters};
 use crate::design::{LiftedPlant, Problem, filters};
 use crate::linalg::{CMat, hermitian_eigenvalues};
 use crate::lti::FrequencyResponse;
@@ -244,7 +244,7 @@ fn an_unstable_bank_has_no_certificate() {
     let SynthesisFilters::StateSpace(block) = &bank.filters else { panic!("states") };
     let n = block.a.len();
     let grown = (0..n).map(|i| (0..n).map(|j| if i == j { 1.5 } else { block.a[i][j] }).collect()).collect();
-    let unstable = StateSpace { a: grown, ..block.clone() };
+    let unstable = StateMatrices { a: grown, ..block.clone() };
     let bank = Bank { filters: SynthesisFilters::StateSpace(unstable), gamma: Gamma::default(), ..bank };
     assert!(matches!(verify(&bank), Err(VerifyError::NotProven { .. })));
     assert!(crate::design::prove(&bank).is_err());

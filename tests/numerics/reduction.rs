@@ -1,7 +1,7 @@
 //! Order reduction as a user meets it: banks of few states, proven, beside FIR banks of the same cost.
 
 use crate::support::specs::{alike, amplified, butterworth, thesis};
-use hybank::bank::{Bank, StateSpace, SynthesisFilters};
+use hybank::bank::{Bank, StateMatrices, SynthesisFilters};
 use hybank::design::{Design, Options, analyze, design};
 use hybank::spec::{DesignSpec, FilterSpec, Method, Reduction, Spec};
 use hybank::verify::verify;
@@ -16,7 +16,7 @@ fn reduced(mut spec: Spec, method: Method, reduction: Reduction) -> Design {
     design(&spec, &Options::default()).unwrap()
 }
 
-fn block(bank: &Bank) -> &StateSpace {
+fn block(bank: &Bank) -> &StateMatrices {
     match &bank.filters {
         SynthesisFilters::StateSpace(block) => block,
         SynthesisFilters::Fir(_) => panic!("taps"),
@@ -24,7 +24,7 @@ fn block(bank: &Bank) -> &StateSpace {
 }
 
 /// Numbers of the matrices that are not zero: multiply-adds per frame.
-fn cost(block: &StateSpace) -> usize {
+fn cost(block: &StateMatrices) -> usize {
     let all = [&block.a, &block.b, &block.c, &block.d];
     all.into_iter().flatten().flatten().filter(|x| **x != 0.0 && **x != 1.0).count()
 }

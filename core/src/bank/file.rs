@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::check::check_length;
 use super::digest::{check_form, digest};
-use super::{Bank, FORMAT, FixedPoint, Gamma, Proof, StateSpace, SynthesisFilters, VERSION, layout};
+use super::{Bank, FORMAT, FixedPoint, Gamma, Proof, StateMatrices, SynthesisFilters, VERSION, layout};
 use crate::messages::{Quoted, of_json};
 use crate::spec::{
     At, DesignOverrides, Method, OneOrEach, Refusal, Spec, SpecProblem, SpecTable, no_models, refusal,
@@ -25,7 +25,7 @@ struct BankTable<S> {
     latency: usize,
     method: Method,
     channels: Vec<ChannelTable>,
-    state_space: Option<StateSpace>,
+    state_space: Option<StateMatrices>,
     #[serde(skip_serializing_if = "Option::is_none")]
     fixed_point: Option<FixedPoint>,
     gamma: Option<Gamma>,
@@ -234,7 +234,7 @@ impl BankTable<SpecTable> {
 }
 
 /// Either every channel has taps, or there is a state-space block.
-fn filters(block: Option<StateSpace>, channels: Vec<ChannelTable>) -> Result<SynthesisFilters, Refusal> {
+fn filters(block: Option<StateMatrices>, channels: Vec<ChannelTable>) -> Result<SynthesisFilters, Refusal> {
     let with_taps = channels.iter().position(|channel| channel.taps.is_some());
     match (block, with_taps) {
         (Some(block), None) => Ok(SynthesisFilters::StateSpace(block)),

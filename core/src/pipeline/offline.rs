@@ -4,7 +4,7 @@ use super::fusion::Fusion;
 use super::{Outcome, PipelineError, Settings};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::runtime::{
-    Frames, Input, Options, Plan, Planar, Precision, ProcessError, SplitOutput, ThreadPool,
+    Frames, InputFrames, Options, Plan, Planar, Precision, ProcessError, SplitOutput, ThreadPool,
 };
 
 /// Samples of a step whose frames are copied: those in which missing samples are estimated, and those
@@ -36,7 +36,7 @@ const MULTIPLY_ADDS_PER_STORE: usize = 8;
 pub fn fuse(
     bank: &Bank,
     plan: &Plan,
-    parts: &[&dyn Input],
+    parts: &[&dyn InputFrames],
     output: &mut dyn SplitOutput,
     settings: Settings<'_>,
     stop: &dyn Fn() -> bool,
@@ -98,7 +98,12 @@ pub fn fused(bank: &Bank, channels: &[Vec<f64>], settings: Settings<'_>) -> Resu
     Ok(output)
 }
 
-fn check(plan: &Plan, parts: &[&dyn Input], capacity: usize, wanted: usize) -> Result<(), ProcessError> {
+fn check(
+    plan: &Plan,
+    parts: &[&dyn InputFrames],
+    capacity: usize,
+    wanted: usize,
+) -> Result<(), ProcessError> {
     let wrong = parts.iter().map(|part| part.channels()).find(|given| *given != plan.channels());
     if let Some(given) = wrong {
         return Err(ProcessError::Channels { given, wanted: plan.channels() });

@@ -22,7 +22,7 @@ const CLEARLY_BETTER: f64 = 0.05;
 
 /// Where the captures show a tone.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Alias {
+pub(super) struct ObservedTone {
     /// Cycles per slow sample: 0 to 1/2, of complex samples -1/2 to 1/2.
     pub(super) cycles: f64,
     pub(super) is_complex: bool,
@@ -30,33 +30,33 @@ pub(super) struct Alias {
 
 /// A frequency that a tone may have.
 #[derive(Debug, Clone, Copy)]
-struct Candidate {
+struct AliasCandidate {
     /// Cycles per slow sample.
     cycles: f64,
     /// Whether the captures show the conjugate: real samples do in odd zones (from 0).
     is_conjugate: bool,
 }
 
-impl Alias {
+impl ObservedTone {
     /// The frequencies with this alias in a Nyquist zone (from 0) of the fast rate.
-    fn candidates(self, ratio: usize, fast_zone: usize) -> Vec<Candidate> {
+    fn candidates(self, ratio: usize, fast_zone: usize) -> Vec<AliasCandidate> {
         let (alias, zones) = (self.cycles, ratio * fast_zone..ratio * (fast_zone + 1));
         if self.is_complex {
             let (least, most) = (0.5 * zones.start as f64, 0.5 * zones.end as f64);
             let wholes = -(zones.end as i64)..=zones.end as i64;
             let inside =
                 wholes.map(|whole| whole as f64 + alias).filter(|x| (least..most).contains(&x.abs()));
-            return inside.map(|cycles| Candidate { cycles, is_conjugate: false }).collect();
+            return inside.map(|cycles| AliasCandidate { cycles, is_conjugate: false }).collect();
         }
         let of_zone = |zone: usize| match zone % 2 {
-            1 => Candidate { cycles: zone.div_ceil(2) as f64 - alias, is_conjugate: true },
-            _ => Candidate { cycles: (zone / 2) as f64 + alias, is_conjugate: false },
+            1 => AliasCandidate { cycles: zone.div_ceil(2) as f64 - alias, is_conjugate: true },
+            _ => AliasCandidate { cycles: (zone / 2) as f64 + alias, is_conjugate: false },
         };
         zones.map(of_zone).collect()
     }
 }
 
-impl Candidate {
+impl AliasCandidate {
     /// How far measured phases are from the nominal ones (radians, rms).
     fn distance(self, model: &Model, phases: &[f64], reference: usize) -> f64 {
         let w = TAU * self.cycles / model.ratio as f64;
@@ -74,7 +74,7 @@ impl Candidate {
 /// signal's zone of the fast rate whose nominal phases agree.
 pub(super) fn zone_of(
     model: &Model,
-    alias: Alias,
+    alias: ObservedTone,
     phases: &[f64],
     reference: usize,
 ) -> Result<f64, CalibrateError> {

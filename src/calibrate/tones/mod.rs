@@ -21,7 +21,7 @@ mod tests;
 
 use super::Settings;
 use super::error::CalibrateError;
-use super::estimates::{Fitted, Tone, contradiction};
+use super::estimates::{CalibrationTone, Fitted, contradiction};
 use super::model::Model;
 use super::order::{Distances, other_order};
 use super::record::Acquisition;
@@ -30,7 +30,7 @@ use crate::linalg::Complex;
 use crate::sine_fit::{self, ChannelFit as SineChannel, Direction, Estimate, alias};
 use crate::spec::Spec;
 use crate::units::{Decibels, Hertz};
-use ambiguity::{Alias, zone_of};
+use ambiguity::{ObservedTone, zone_of};
 use interference::{is_harmonic, repeating_variances, widen_repeating};
 use phasors::{Captures, Measured};
 use solution::{CUTOFF_TONES, distinct, explained, outlying, solve};
@@ -100,7 +100,7 @@ struct Tones {
     frames: usize,
     /// Those of the given ones that it holds.
     given: Vec<Hertz>,
-    tones: Vec<Tone>,
+    tones: Vec<CalibrationTone>,
     measured: Vec<Measured>,
     /// The constant of each part of each converter.
     constants: Vec<Estimate<f64>>,
@@ -143,7 +143,7 @@ impl Tones {
             let Estimate { value, sigma } = channel.constant;
             Estimate { value, sigma: sigma.hypot(repeating.sqrt()) }
         };
-        let tone = |&t: &usize| Tone {
+        let tone = |&t: &usize| CalibrationTone {
             frequency: sines.frequencies[t],
             zone: (2.0 * (sines.frequencies[t].value / rate).abs()).floor() as usize + 1,
             amplitude: captures.tone(&sines, first, t, Direction::Forward).amplitude,
@@ -274,7 +274,7 @@ fn found(
         check_position(starts[t], rate, frames)?;
         let phase = |i| captures.tone(&sines, i, t, directions[t]).phase.value.0;
         let phases: Vec<f64> = (0..model.channels()).map(phase).collect();
-        let alias = Alias { cycles: cycles[t], is_complex: captures.is_complex };
+        let alias = ObservedTone { cycles: cycles[t], is_complex: captures.is_complex };
         starts[t] = rate * zone_of(model, alias, &phases, reference)?;
     }
     Ok((starts, used))

@@ -12,7 +12,7 @@ use crate::design::error_grid::{ErrorGrid, Location};
 use crate::design::exchange::{Exchange, LEAST_MARGIN};
 use crate::design::filters::impulse_responses;
 use crate::design::plant::LiftedPlant;
-use crate::lmi::sampled::{MeanSquareObjective, Problem};
+use crate::lmi::sampled::{MeanSquareObjective, SampledProblem};
 use crate::lti::peak::Peak;
 
 /// Default relative margin of gamma that may be spent on less noise at the output, if the converters' noise
@@ -53,7 +53,7 @@ fn exchange<'a>(plant: &'a LiftedPlant, settings: &Settings) -> Result<Exchange<
     let noise = plant.problem().noise.clone();
     let margin = settings.gamma_margin.unwrap_or_else(|| usual_margin(&noise));
     let objective = MeanSquareObjective { weights, noise };
-    let problem = Problem::new(points, lags);
+    let problem = SampledProblem::new(points, lags);
     let mut exchange = Exchange::new(grid, problem, std::iter::repeat(()), objective, margin);
     exchange.stop = settings.stop.clone();
     Ok(exchange)

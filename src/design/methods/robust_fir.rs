@@ -16,7 +16,7 @@ use crate::design::plant::LiftedPlant;
 use crate::design::uncertainty::box_plant::{BoxPlant, Combination};
 use crate::design::uncertainty::search::BoxSearch;
 use crate::linalg::{self, CMat};
-use crate::lmi::sampled::{MeanSquareObjective, Point, Problem as SampledProblem, Taps};
+use crate::lmi::sampled::{FrequencyPoint, MeanSquareObjective, SampledProblem, Taps};
 use crate::spec::{ErrorBox, Method, Spec};
 use crate::units::Seconds;
 
@@ -146,7 +146,7 @@ struct BoxError {
 impl AffineError for BoxError {
     type Scenario = Combination;
 
-    fn at(&self, location: &Location<Combination>) -> Point {
+    fn at(&self, location: &Location<Combination>) -> FrequencyPoint {
         let response = self.search.plant().response(location.frequency);
         let h = self.search.plant().measurements(&response, &location.scenario);
         let count = h.nrows();
@@ -154,7 +154,7 @@ impl AffineError for BoxError {
         let rows = |first: usize, rows: usize| -> CMat {
             g.rows(first, rows).into_owned().resize_horizontally(self.inputs, Default::default())
         };
-        Point { omega: location.frequency, h: rows(0, count), w: rows(count, g.nrows() - count) }
+        FrequencyPoint { omega: location.frequency, h: rows(0, count), w: rows(count, g.nrows() - count) }
     }
 
     fn peaks(&self, taps: &Taps, level: f64) -> Result<Vec<LocatedPeak<Combination>>, DesignError> {

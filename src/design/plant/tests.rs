@@ -62,7 +62,7 @@ fn the_error_system_is_w_minus_f_h() {
 fn the_response_keeps_all_products() {
     for plant in plants() {
         for omega in [0.0, 0.8, 2.2, PI] {
-            let Point { h, w, .. } = plant.at(omega);
+            let FrequencyPoint { h, w, .. } = plant.at(omega);
             assert!(h.ncols() <= plant.channels() + plant.ratio());
             let all = plant.system().response_at(Complex::from_polar(1.0, omega));
             let compressed = linalg::vstack(&[&h, &w]);

@@ -83,7 +83,7 @@ pub(super) fn certificate(
     {
         (norm, peak_witness) = (gain / units.reference, enclosed);
     }
-    let search = Search { error, units: &units, middle: &middle, peak: peak_witness };
+    let search = CertificateSearch { error, units: &units, middle: &middle, peak: peak_witness };
     let level = |excess: &f64| Level { norm, excess: excess * norm.max(floor) };
     let mut failure = None;
     let mut in_doubles = |excess: &f64| {
@@ -134,7 +134,7 @@ impl Level {
 }
 
 /// What is certified.
-struct Search<'a> {
+struct CertificateSearch<'a> {
     error: &'a EnclosedErrorSystem<'a>,
     units: &'a Units,
     /// The system in these units.
@@ -142,7 +142,7 @@ struct Search<'a> {
     peak: GainWitness,
 }
 
-impl Search<'_> {
+impl CertificateSearch<'_> {
     /// The certificate of these numbers in units of one, if it proves its gamma.
     fn passes(&self, level: Level, factor: Vec<Vec<f64>>, correction: Vec<Vec<f64>>) -> Option<Certificate> {
         let gamma = level.gamma() * self.units.reference;

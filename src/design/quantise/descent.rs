@@ -5,7 +5,7 @@ use crate::design::DesignError;
 use crate::design::filters::response;
 use crate::design::limits::Stop;
 use crate::linalg::{self, CMat, Complex, Mat};
-use crate::lmi::sampled::Point;
+use crate::lmi::sampled::FrequencyPoint;
 
 /// Moves tried in pairs: those that lower the error at the worst frequency most.
 const MOVES_IN_PAIRS: usize = 48;
@@ -26,7 +26,7 @@ struct Move {
 
 /// Integer taps with the error that they leave at the points of a grid.
 pub(super) struct Descent<'a> {
-    points: &'a [Point],
+    points: &'a [FrequencyPoint],
     ratio: usize,
     step: f64,
     spans: &'a [Span],
@@ -44,7 +44,7 @@ pub(super) struct Descent<'a> {
 impl<'a> Descent<'a> {
     /// Integers times `step` are the taps; `lags` are the same taps by lag, `spans` the bounds by tap.
     pub(super) fn new(
-        points: &'a [Point],
+        points: &'a [FrequencyPoint],
         spans: &'a [Span],
         step: f64,
         integers: Vec<Vec<f64>>,

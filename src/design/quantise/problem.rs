@@ -15,7 +15,7 @@ use crate::design::filters::{polyphase, response};
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, CMat, Complex, Mat};
-use crate::lmi::sampled::Point;
+use crate::lmi::sampled::FrequencyPoint;
 use crate::spec::{MAX_BITS, WordLengths};
 
 /// Taps to be replaced by integers times a power of two.
@@ -35,7 +35,7 @@ pub(in crate::design) struct QuantisationProblem<'a> {
 
 /// Integer taps with their error.
 #[derive(Debug, Clone)]
-pub(super) struct Candidate {
+pub(super) struct IntegerCandidate {
     /// The integers with their scale.
     pub(super) fixed_point: FixedPoint,
     /// Estimate of gamma on the grid.
@@ -56,13 +56,13 @@ pub(super) struct TapError<'a> {
     pub(super) ratio: usize,
     pub(super) grid: ErrorGrid<'a>,
     /// The points of the grid.
-    pub(super) points: Vec<Point>,
+    pub(super) points: Vec<FrequencyPoint>,
     pub(super) forms: Forms,
     /// Estimate of gamma of the real taps.
     pub(super) real_gamma: f64,
     /// The least gamma that counts.
     pub(super) least_gamma: f64,
-    /// Mean square of the real taps, as in [`Candidate`].
+    /// Mean square of the real taps, as in [`IntegerCandidate`].
     pub(super) real_mean_square: f64,
     /// The least mean square that counts.
     least_mean_square: f64,
@@ -99,12 +99,12 @@ impl<'a> TapError<'a> {
     }
 
     /// The error of integer taps.
-    pub(super) fn candidate(&self, fixed_point: FixedPoint) -> Result<Candidate, DesignError> {
+    pub(super) fn candidate(&self, fixed_point: FixedPoint) -> Result<IntegerCandidate, DesignError> {
         let taps = fixed_point.taps();
         let lags = polyphase(&taps, self.ratio);
         let found = self.grid.mean_square(&lags) + output_noise(self.problem.noise, &taps);
         let mean_square = found.max(self.least_mean_square);
-        Ok(Candidate { gamma: self.grid.gamma(&lags)?, mean_square, fixed_point })
+        Ok(IntegerCandidate { gamma: self.grid.gamma(&lags)?, mean_square, fixed_point })
     }
 
     /// The mean square that a unit of each channel's tap adds.
@@ -200,7 +200,7 @@ pub(super) struct Correlations {
 }
 
 impl Forms {
-    pub(super) fn new(points: &[Point]) -> Self {
+    pub(super) fn new(points: &[FrequencyPoint]) -> Self {
         Self {
             omegas: points.iter().map(|point| point.omega).collect(),
             grams: points.iter().map(|point| &point.h * point.h.adjoint()).collect(),

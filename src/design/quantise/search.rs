@@ -2,7 +2,7 @@
 
 use super::descent::Descent;
 use super::lattice::{Span, closest};
-use super::problem::{Candidate, Tap, TapError};
+use super::problem::{IntegerCandidate, Tap, TapError};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::design::filters::polyphase;
@@ -20,7 +20,7 @@ const NEGLIGIBLE_LOSS: f64 = 2e-5;
 type Integers = Vec<Vec<f64>>;
 
 /// The search at one scale.
-pub(super) struct Search<'a> {
+pub(super) struct LatticeSearch<'a> {
     error: &'a TapError<'a>,
     bits: &'a WordLengths,
     fraction_bits: i32,
@@ -29,7 +29,7 @@ pub(super) struct Search<'a> {
     spans: Vec<Span>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> LatticeSearch<'a> {
     pub(super) fn new(error: &'a TapError<'a>, bits: &'a WordLengths, fraction_bits: i32) -> Self {
         let centre = in_steps(error.problem.taps, fraction_bits);
         let spans = (0..centre[0].len()).map(|n| Span::of(bits, n)).collect();
@@ -38,7 +38,7 @@ impl<'a> Search<'a> {
 
     /// All candidates: zero output, the rounded taps, those of the rounds of reweighting, and the end of a
     /// descent from the best of these.
-    pub(super) fn run(&self) -> Result<Vec<Candidate>, DesignError> {
+    pub(super) fn run(&self) -> Result<Vec<IntegerCandidate>, DesignError> {
         let mut found =
             vec![self.error.candidate(self.zero_output())?, self.error.candidate(self.rounded())?];
         self.reweighted(&mut found)?;
@@ -50,7 +50,7 @@ impl<'a> Search<'a> {
 
     /// The candidate close to the real `taps` of least mean square, in which the noise of the converters
     /// counts.
-    pub(super) fn near_least_square(&self, taps: &[Vec<f64>]) -> Result<Candidate, DesignError> {
+    pub(super) fn near_least_square(&self, taps: &[Vec<f64>]) -> Result<IntegerCandidate, DesignError> {
         let centre = in_steps(taps, self.fraction_bits);
         let closest = self.closest(&centre, &self.error.grid.mean_weights(), self.error.problem.noise)?;
         self.error.candidate(self.fixed_point(&closest))
@@ -80,7 +80,7 @@ impl<'a> Search<'a> {
 
     /// Closest lattice points, with weights that grow at the frequencies where the last point was worst
     /// (Lawson).
-    fn reweighted(&self, found: &mut Vec<Candidate>) -> Result<(), DesignError> {
+    fn reweighted(&self, found: &mut Vec<IntegerCandidate>) -> Result<(), DesignError> {
         let real = self.error.real_gamma;
         let mut weights = vec![1.0; self.error.points.len()];
         for _ in (0..ROUNDS).take_while(|_| !self.error.problem.stop.is_due()) {

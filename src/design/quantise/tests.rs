@@ -1,5 +1,5 @@
 use super::quantiser::GAMMA_TIE;
-use super::search::Search;
+use super::search::LatticeSearch;
 use super::*;
 use crate::bank::SynthesisFilters;
 use crate::design::error_grid::ErrorGrid;
@@ -72,7 +72,7 @@ fn small_banks_reach_what_trying_all_integers_reaches() {
         let quantiser = quantiser(&plant, &taps).unwrap();
         let found = quantiser.quantise(&words, None).unwrap();
         let scale = found.fixed_point.fraction_bits;
-        let search = Search::new(&quantiser.error, &words, scale);
+        let search = LatticeSearch::new(&quantiser.error, &words, scale);
         let all = brute_force(&plant, &search.rounded(), 1);
         assert!(found.gamma <= all * 1.001, "{bits} bits: {} found, {all} is there", found.gamma);
         assert!(found.gamma <= quantiser.rounded(&words, None).unwrap() * (1.0 + GAMMA_TIE));
@@ -198,7 +198,9 @@ fn the_mean_square_decides_among_integers_of_like_gamma() {
         let found = quantiser.quantise(&WordLengths::Same(bits), None).unwrap();
         let tried = [0, 1].map(|finer| {
             let words = WordLengths::Same(bits);
-            Search::new(&quantiser.error, &words, quantiser.finest_that_fits(&words) + finer).run().unwrap()
+            LatticeSearch::new(&quantiser.error, &words, quantiser.finest_that_fits(&words) + finer)
+                .run()
+                .unwrap()
         });
         let cap = found.gamma * (1.0 + 1e-9);
         assert!(

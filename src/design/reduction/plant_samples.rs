@@ -7,7 +7,7 @@ use crate::design::error_grid::{AffineError, LocatedPeak, Location};
 use crate::design::exchange::Exchange;
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
-use crate::lmi::sampled::{self, MeanSquareObjective, Point, Taps};
+use crate::lmi::sampled::{self, FrequencyPoint, MeanSquareObjective, Taps};
 use crate::lti::peak::{peaks_above, resonances, stable_poles};
 use crate::lti::{FrequencyResponse, StateSpace};
 use std::f64::consts::PI;
@@ -26,7 +26,7 @@ pub(super) struct PlantSamples<'a> {
     /// Ends each problem with the best outputs so far.
     stop: &'a Stop,
     /// The first GRID + 1 are uniform.
-    samples: Vec<Point>,
+    samples: Vec<FrequencyPoint>,
 }
 
 impl<'a> PlantSamples<'a> {
@@ -59,7 +59,7 @@ impl<'a> PlantSamples<'a> {
     ) -> Result<StateSpace, DesignError> {
         let regressors = FrequencyResponse::new(&recursion.regressors());
         let points = self.samples.iter().map(|sample| driving(&regressors, sample.clone())).collect();
-        let problem = sampled::Problem::new(points, vec![1; self.plant.ratio()]);
+        let problem = sampled::SampledProblem::new(points, vec![1; self.plant.ratio()]);
         let objective = MeanSquareObjective::noiseless(self.weights(), problem.channels());
         let error = OutputError { plant: self.plant, recursion, regressors };
         let mut exchange = Exchange::new(error, problem, std::iter::repeat(()), objective, gamma_margin);
@@ -86,7 +86,7 @@ struct OutputError<'a> {
 impl AffineError for OutputError<'_> {
     type Scenario = ();
 
-    fn at(&self, location: &Location<()>) -> Point {
+    fn at(&self, location: &Location<()>) -> FrequencyPoint {
         driving(&self.regressors, self.plant.at(location.frequency))
     }
 
@@ -97,6 +97,6 @@ impl AffineError for OutputError<'_> {
 }
 
 /// The point with the regressors as measurements.
-fn driving(regressors: &FrequencyResponse, point: Point) -> Point {
-    Point { h: regressors.at_frequency(point.omega) * point.h, ..point }
+fn driving(regressors: &FrequencyResponse, point: FrequencyPoint) -> FrequencyPoint {
+    FrequencyPoint { h: regressors.at_frequency(point.omega) * point.h, ..point }
 }

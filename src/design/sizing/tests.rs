@@ -1,6 +1,6 @@
 use super::*;
 use crate::design::fir_errors::FirErrors;
-use crate::design::length::Figure;
+use crate::design::length::TargetFigure;
 use crate::design::root_covariance::RootCovariance;
 use crate::lmi::sampled;
 use crate::spec::{DesignSpec, FilterSpec};
@@ -98,7 +98,7 @@ fn least_mean_square(problem: &Problem, latency: usize, taps: usize) -> f64 {
     let lags: Vec<usize> = (0..ratio).map(|p| taps.saturating_sub(p).div_ceil(ratio)).collect();
     let count = 256;
     let points = (0..=count).map(|k| plant.at(std::f64::consts::PI * k as f64 / count as f64));
-    let grid = sampled::Problem::new(points.collect(), lags);
+    let grid = sampled::SampledProblem::new(points.collect(), lags);
     let weight = |k: usize| if k == 0 || k == count { 0.5 } else { 1.0 } / count as f64;
     let weights: Vec<f64> = (0..=count).map(weight).collect();
     let square = sampled::MeanSquareObjective { weights, noise: problem.noise.clone() };
@@ -166,7 +166,7 @@ fn as_many_taps_are_chosen_as_the_snr_needs() {
 fn an_snr_that_is_out_of_reach_is_refused_with_the_best_one() {
     let open = Spec { latency: Some(9), ..spec("target_snr_db = 200, method = \"h2\", noise = 1e-3") };
     let refused = Sizing::of(&open).unwrap_err();
-    let DesignError::FigureOutOfReach { figure: Figure::Snr, wanted, best, latency } = refused else {
+    let DesignError::FigureOutOfReach { figure: TargetFigure::Snr, wanted, best, latency } = refused else {
         panic!("{refused}")
     };
     assert!(wanted == 200.0 && latency == 9 && (30.0..70.0).contains(&best), "{refused}");

@@ -1,8 +1,8 @@
 //! Orthonormal bases of the range of the taps, for least squares and for dual matrices that are exactly
 //! orthogonal to every tap.
 
-use super::prepare::Reduced;
-use crate::linalg::blocks::Blocks;
+use super::prepare::ReducedProblem;
+use crate::linalg::blocks::MatrixBlocks;
 use crate::linalg::{self, LinalgError, Mat, Svd};
 
 /// Singular values below this, relative to the largest, count as zero.
@@ -22,7 +22,11 @@ pub(super) struct Basis {
 impl Basis {
     /// `weights[l]` multiplies the row entries at point l.
     /// The taps of original channel i, times `noise[i]`, are further rows whose reference is zero.
-    pub(super) fn new(reduced: &Reduced, weights: Vec<f64>, noise: &[f64]) -> Result<Self, LinalgError> {
+    pub(super) fn new(
+        reduced: &ReducedProblem,
+        weights: Vec<f64>,
+        noise: &[f64],
+    ) -> Result<Self, LinalgError> {
         let map = row_map(reduced, &weights, noise);
         let zero_rows = map.nrows() - 2 * reduced.h.cols() * reduced.count();
         let (l, q) = linalg::lq(&map.transpose());
@@ -58,7 +62,7 @@ impl Basis {
 
     /// Taps of all rows that minimise `sum_l weights_l^2 ||w_l - F h_l||_F^2`, least norm among
     /// directions weaker than `cut` times the strongest.
-    pub(super) fn least_squares(&self, reduced: &Reduced, w: &Blocks, cut: f64) -> Vec<f64> {
+    pub(super) fn least_squares(&self, reduced: &ReducedProblem, w: &MatrixBlocks, cut: f64) -> Vec<f64> {
         let mut x = vec![0.0; reduced.layout.unknowns()];
         for p in 0..reduced.layout.rows {
             let Some(svd) = self.triangle(reduced.layout.lags[p]) else { continue };
@@ -77,7 +81,7 @@ impl Basis {
 
     /// Makes each row of `y` orthogonal to the range of its taps, in two passes for the last digits. Needs a
     /// basis with unit weights.
-    pub(super) fn project_out(&self, reduced: &Reduced, y: &mut Blocks, cut: f64) {
+    pub(super) fn project_out(&self, reduced: &ReducedProblem, y: &mut MatrixBlocks, cut: f64) {
         for p in 0..reduced.layout.rows {
             let Some(svd) = self.triangle(reduced.layout.lags[p]) else { continue };
             let u = svd.u.columns(0, svd.rank(cut));
@@ -94,7 +98,7 @@ impl Basis {
 
 /// Rows: real parts of all (point, input), then imaginary parts, then the noise of all (lag, channel with
 /// noise). Columns: lag by lag, channels inside.
-fn row_map(reduced: &Reduced, weights: &[f64], noise: &[f64]) -> Mat {
+fn row_map(reduced: &ReducedProblem, weights: &[f64], noise: &[f64]) -> Mat {
     let (n, k, lags) = (reduced.layout.channels, reduced.h.cols(), reduced.phases.lags());
     let half = k * reduced.count();
     let noisy: Vec<usize> = (0..noise.len()).filter(|&i| noise[i] > 0.0).collect();
@@ -113,7 +117,7 @@ fn row_map(reduced: &Reduced, weights: &[f64], noise: &[f64]) -> Mat {
     map
 }
 
-fn row_vector(y: &Blocks, p: usize, weights: &[f64], zero_rows: usize) -> Mat {
+fn row_vector(y: &MatrixBlocks, p: usize, weights: &[f64], zero_rows: usize) -> Mat {
     let (k, half) = (y.cols(), y.cols() * y.count());
     Mat::from_fn(2 * half + zero_rows, 1, |r, _| {
         if r >= 2 * half {
@@ -125,7 +129,7 @@ fn row_vector(y: &Blocks, p: usize, weights: &[f64], zero_rows: usize) -> Mat {
     })
 }
 
-fn set_row(y: &mut Blocks, p: usize, row: &Mat) {
+fn set_row(y: &mut MatrixBlocks, p: usize, row: &Mat) {
     let (m, k, half) = (y.rows(), y.cols(), y.cols() * y.count());
     for l in 0..y.count() {
         let block = y.block_mut(l);

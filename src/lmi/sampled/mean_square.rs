@@ -5,9 +5,9 @@
 //! those of least mean square have small errors at all frequencies.
 
 use super::basis::Basis;
-use super::interior::{Engine, Objective};
-use super::prepare::Reduced;
-use super::problem::{MeanSquareObjective, Point, Problem, Taps};
+use super::interior::{InteriorIterate, Objective};
+use super::prepare::ReducedProblem;
+use super::problem::{FrequencyPoint, MeanSquareObjective, SampledProblem, Taps};
 use super::quadratic::Quadratic;
 use crate::linalg::LinalgError;
 use crate::lmi::IsDue;
@@ -16,7 +16,7 @@ use crate::lmi::iteration::{self, Iterate, RANK_TOLERANCE};
 
 /// Taps of least mean square under a cap.
 #[derive(Debug, Clone)]
-pub struct MeanSquare {
+pub struct CappedMeanSquare {
     /// `F_j`, M x N for each lag.
     pub taps: Taps,
     /// The secondary objective of these taps.
@@ -36,11 +36,11 @@ const WAY_TO_CAP: f64 = 0.999;
 /// Taps that minimise the secondary objective, by a QR factorisation (never by normal equations); least norm
 /// among directions weaker than `tol_rank` times the strongest.
 pub(crate) fn least_squares(
-    problem: &Problem,
+    problem: &SampledProblem,
     square: &MeanSquareObjective,
     tol_rank: f64,
 ) -> Result<Taps, LinalgError> {
-    let reduced = Reduced::new(problem)?;
+    let reduced = ReducedProblem::new(problem)?;
     if reduced.layout.unknowns() == 0 {
         return Ok(problem.zero_taps());
     }
@@ -57,16 +57,16 @@ pub(crate) fn least_squares(
 /// The result is never worse than the start, and satisfies the cap, however the iteration ended; when
 /// the end `is_due`, it is the best so far.
 pub fn mean_square_under_cap(
-    problem: &Problem,
+    problem: &SampledProblem,
     square: &MeanSquareObjective,
     cap: f64,
     start: &Taps,
     tol_gap_rel: f64,
     is_due: IsDue<'_>,
-) -> Result<Option<MeanSquare>, LinalgError> {
+) -> Result<Option<CappedMeanSquare>, LinalgError> {
     let free = least_squares(problem, square, RANK_TOLERANCE)?;
     let free_square = problem.mean_square(&free, square);
-    let mut best = Best::new(problem, square, cap, start)?;
+    let mut best = BestCapped::new(problem, square, cap, start)?;
     best.offer(free)?;
     if best.mean_square == free_square {
         return Ok(Some(best.finish(free_square, 0)));
@@ -76,16 +76,16 @@ pub fn mean_square_under_cap(
     }
     // From the start, in units of the cap and of the start's own mean square.
     let unit = best.mean_square / (cap * cap);
-    let mut reduced = Reduced::new(&residual_problem(problem, start))?;
+    let mut reduced = ReducedProblem::new(&residual_problem(problem, start))?;
     reduced.rescale(cap);
     let quadratic = Quadratic::new(&reduced, square, start, cap, unit);
     let zero = vec![0.0; reduced.layout.unknowns()];
     let curvature = RegularisedCholesky::new(quadratic.curvature(&reduced));
-    let engine = Engine::new(&reduced, Objective::MeanSquare(quadratic), zero, 1.0, is_due);
+    let engine = InteriorIterate::new(&reduced, Objective::MeanSquare(quadratic), zero, 1.0, is_due);
     let (Some(engine), Ok(curvature)) = (engine, curvature) else {
         return Ok(Some(best.finish(free_square, 0)));
     };
-    let mut run = Run { engine, curvature };
+    let mut run = CappedIteration { engine, curvature };
     let (_, iterations) = iteration::run(&mut run, tol_gap_rel, is_due)?;
     let step = reduced.taps(&run.engine.x);
     let found = start.iter().zip(step).map(|(f, d)| f + d * cap).collect();
@@ -95,16 +95,16 @@ pub fn mean_square_under_cap(
 }
 
 /// The problem with the error of `start` as its reference.
-fn residual_problem(problem: &Problem, start: &Taps) -> Problem {
+fn residual_problem(problem: &SampledProblem, start: &Taps) -> SampledProblem {
     let point = |l: usize| {
         let p = &problem.points()[l];
-        Point { omega: p.omega, w: problem.error_at(l, start), h: p.h.clone() }
+        FrequencyPoint { omega: p.omega, w: problem.error_at(l, start), h: p.h.clone() }
     };
-    Problem::new((0..problem.points().len()).map(point).collect(), problem.lags().to_vec())
+    SampledProblem::new((0..problem.points().len()).map(point).collect(), problem.lags().to_vec())
 }
 
-struct Best<'a> {
-    problem: &'a Problem,
+struct BestCapped<'a> {
+    problem: &'a SampledProblem,
     square: &'a MeanSquareObjective,
     cap: f64,
     taps: Taps,
@@ -112,9 +112,9 @@ struct Best<'a> {
     gamma: f64,
 }
 
-impl<'a> Best<'a> {
+impl<'a> BestCapped<'a> {
     fn new(
-        problem: &'a Problem,
+        problem: &'a SampledProblem,
         square: &'a MeanSquareObjective,
         cap: f64,
         start: &Taps,
@@ -145,19 +145,19 @@ impl<'a> Best<'a> {
         Ok(self.taps.iter().zip(taps).map(|(own, taps)| own + (taps - own) * share).collect())
     }
 
-    fn finish(self, lower: f64, iterations: usize) -> MeanSquare {
+    fn finish(self, lower: f64, iterations: usize) -> CappedMeanSquare {
         let Self { taps, mean_square, gamma, .. } = self;
-        MeanSquare { taps, mean_square, lower: lower.min(mean_square), gamma, iterations }
+        CappedMeanSquare { taps, mean_square, lower: lower.min(mean_square), gamma, iterations }
     }
 }
 
-struct Run<'a> {
-    engine: Engine<'a>,
+struct CappedIteration<'a> {
+    engine: InteriorIterate<'a>,
     /// Q, the second derivative of the objective.
     curvature: RegularisedCholesky,
 }
 
-impl Run<'_> {
+impl CappedIteration<'_> {
     /// `<S, Z> + r' Q^{-1} r / 2` with the dual residual r: how far the Lagrangian's minimum lies below the
     /// objective, whether or not the dual equality holds.
     fn duality_gap(&self) -> f64 {
@@ -167,7 +167,7 @@ impl Run<'_> {
     }
 }
 
-impl Iterate for Run<'_> {
+impl Iterate for CappedIteration<'_> {
     fn gap(&mut self) -> f64 {
         self.duality_gap() / self.engine.value().max(f64::MIN_POSITIVE)
     }

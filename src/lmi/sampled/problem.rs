@@ -8,7 +8,7 @@ pub type Taps = Vec<Mat>;
 
 /// A frequency with the responses of the reference and the measurements.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct FrequencyPoint {
     /// Frequency in radians per lag.
     pub omega: f64,
     /// Response of the reference, M x q.
@@ -17,7 +17,7 @@ pub struct Point {
     pub h: CMat,
 }
 
-impl Point {
+impl FrequencyPoint {
     /// K = W - F H for the filters' response F.
     pub(crate) fn error(&self, filters: &CMat) -> CMat {
         &self.w - filters * &self.h
@@ -47,17 +47,17 @@ impl MeanSquareObjective {
 
 /// A sampled worst-case norm problem with consistent sizes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Problem {
-    points: Vec<Point>,
+pub struct SampledProblem {
+    points: Vec<FrequencyPoint>,
     lags: Vec<usize>,
 }
 
-impl Problem {
+impl SampledProblem {
     /// `lags[p]` is the number of lags of row p, M of them; 0 fixes the row at zero.
     ///
     /// # Panics
     /// Unless there is a point, all points have the sizes of the first, and each row has its lags.
-    pub fn new(points: Vec<Point>, lags: Vec<usize>) -> Self {
+    pub fn new(points: Vec<FrequencyPoint>, lags: Vec<usize>) -> Self {
         let (w, h) = (points[0].w.shape(), points[0].h.shape());
         let fits = points.iter().all(|point| point.w.shape() == w && point.h.shape() == h);
         assert!(
@@ -68,7 +68,7 @@ impl Problem {
     }
 
     /// The points.
-    pub(crate) fn points(&self) -> &[Point] {
+    pub(crate) fn points(&self) -> &[FrequencyPoint] {
         &self.points
     }
 
@@ -103,7 +103,7 @@ impl Problem {
     }
 
     /// The same problem with more points.
-    pub(crate) fn with_points(&self, more: impl IntoIterator<Item = Point>) -> Self {
+    pub(crate) fn with_points(&self, more: impl IntoIterator<Item = FrequencyPoint>) -> Self {
         Self::new(self.points.iter().cloned().chain(more).collect(), self.lags.clone())
     }
 

@@ -5,10 +5,10 @@
 //! of the noise.
 
 use super::newton;
-use super::prepare::Reduced;
+use super::prepare::ReducedProblem;
 use super::problem::{MeanSquareObjective, Taps};
 use crate::linalg::Mat;
-use crate::linalg::blocks::Blocks;
+use crate::linalg::blocks::MatrixBlocks;
 
 /// See the module's text.
 #[derive(Debug, Clone)]
@@ -25,7 +25,7 @@ pub(super) struct Quadratic {
 impl Quadratic {
     /// `square` about `start`, the taps in units of `cap`, the objective in units of `unit cap^2`.
     pub(super) fn new(
-        reduced: &Reduced,
+        reduced: &ReducedProblem,
         square: &MeanSquareObjective,
         start: &Taps,
         cap: f64,
@@ -48,7 +48,7 @@ impl Quadratic {
     }
 
     /// The objective at the unknowns `x`, whose errors are `k`.
-    pub(super) fn value(&self, k: &Blocks, x: &[f64]) -> f64 {
+    pub(super) fn value(&self, k: &MatrixBlocks, x: &[f64]) -> f64 {
         let square = |l: usize| k.block(l).data.iter().map(|z| z.norm_sqr()).sum::<f64>();
         let errors: f64 = self.weights.iter().enumerate().map(|(l, w)| w * square(l)).sum();
         let (bent, straight) = self.noise_slope(x);
@@ -57,7 +57,7 @@ impl Quadratic {
     }
 
     /// Its derivative in the unknowns.
-    pub(super) fn gradient(&self, reduced: &Reduced, k: &Blocks, x: &[f64]) -> Vec<f64> {
+    pub(super) fn gradient(&self, reduced: &ReducedProblem, k: &MatrixBlocks, x: &[f64]) -> Vec<f64> {
         let mut weighted = k.clone();
         let size = weighted.rows() * weighted.cols();
         for (i, z) in weighted.as_mut_slice().iter_mut().enumerate() {
@@ -69,7 +69,7 @@ impl Quadratic {
     }
 
     /// Its second derivative (lower triangle).
-    pub(super) fn curvature(&self, reduced: &Reduced) -> Mat {
+    pub(super) fn curvature(&self, reduced: &ReducedProblem) -> Mat {
         let unknowns = reduced.layout.unknowns();
         let mut q = Mat::zeros(unknowns, unknowns);
         newton::add_mean_square(&mut q, &reduced.layout, &reduced.phases, &reduced.h, &self.weights);

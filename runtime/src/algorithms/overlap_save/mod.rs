@@ -21,7 +21,7 @@ mod tests;
 pub(crate) use shape::Shape;
 
 use super::filter::{Facts, Filter, check_finite};
-use crate::adapters::{Input, Output};
+use crate::adapters::{InputFrames, OutputFrames};
 use crate::simd::{Lanes, Product, Row, group_lanes, multiply, replace_not_finite};
 use crate::state::{Count, Numbers};
 use crate::{BuildError, Isa, Sample};
@@ -143,7 +143,12 @@ impl<T: Sample> Filter for OverlapSave<T> {
         state.filled = 0;
     }
 
-    fn process(&self, state: &mut OverlapSaveState<T>, input: &dyn Input, output: &mut dyn Output) -> u64 {
+    fn process(
+        &self,
+        state: &mut OverlapSaveState<T>,
+        input: &dyn InputFrames,
+        output: &mut dyn OutputFrames,
+    ) -> u64 {
         let Shape { channels: n, ratio: m, history, .. } = self.shape;
         let (mut replaced, mut first) = (0, 0);
         while first < input.frames() {

@@ -93,7 +93,7 @@ fn long_prime_and_empty_filters_work() {
 
 #[test]
 fn recursive_banks_have_no_transforms() {
-    let filter = crate::StateSpace { a: vec![], b: vec![], c: vec![vec![]], d: vec![vec![1.0]] };
+    let filter = crate::StateMatrices { a: vec![], b: vec![], c: vec![vec![]], d: vec![vec![1.0]] };
     let bank = recursive_bank(filter);
     let refused = |algorithm| start(&bank, by(algorithm)).err();
     assert_eq!(refused(Algorithm::OverlapSave), Some(BuildError::Recursive { algorithm: "overlap-save" }));

@@ -17,7 +17,7 @@ mod tests;
 pub use self::delay_lines::{DelayLines, DelayedInput};
 use self::layout::Layout;
 use super::filter::{Facts, Filter};
-use crate::adapters::{Input, Output};
+use crate::adapters::{InputFrames, OutputFrames};
 use crate::aligned::Aligned;
 use crate::history::History;
 use crate::simd::{FirKernel, Form, Polyphase, Recursion, RecursionKernel, Segment, replace_not_finite};
@@ -28,7 +28,7 @@ use crate::{BuildError, Isa};
 /// its M output samples. Row-major lists of rows.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct StateSpace {
+pub struct StateMatrices {
     /// n x n.
     pub a: Vec<Vec<f64>>,
     /// n x N.
@@ -81,7 +81,7 @@ pub(crate) struct RecursiveState {
 impl Recursive {
     /// For N = `channels` and M = `ratio`.
     pub(crate) fn new(
-        filter: &StateSpace,
+        filter: &StateMatrices,
         channels: usize,
         ratio: usize,
         isa: Isa,
@@ -164,7 +164,12 @@ impl Filter for Recursive {
         state.resets = 0;
     }
 
-    fn process(&self, state: &mut RecursiveState, input: &dyn Input, output: &mut dyn Output) -> u64 {
+    fn process(
+        &self,
+        state: &mut RecursiveState,
+        input: &dyn InputFrames,
+        output: &mut dyn OutputFrames,
+    ) -> u64 {
         let (mut replaced, mut first) = (0, 0);
         while first < input.frames() {
             let frames = (input.frames() - first).min(BLOCK - state.phase_offset);

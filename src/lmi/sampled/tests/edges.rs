@@ -71,7 +71,7 @@ fn an_iteration_whose_end_is_due_ends_at_once_with_its_best_taps() {
 fn what_is_not_finite_is_refused_and_a_cap_below_the_start_has_no_taps() {
     let good = random_problem(1, (2, 2, 3), 3, &[2, 2]);
     let bad = Complex::new(0.0, f64::INFINITY);
-    let refused = |change: &dyn Fn(&mut Point)| {
+    let refused = |change: &dyn Fn(&mut FrequencyPoint)| {
         minimise(
             &changed(&good, |l, p| {
                 if l == 1 {

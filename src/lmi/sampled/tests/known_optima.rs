@@ -80,9 +80,9 @@ fn one_step_prediction_meets_the_nehari_bound() {
     for a in [0.0, 0.5, -0.7, 0.8] {
         let point = |omega: f64| {
             let z = Complex::from_polar(1.0, omega);
-            Point { omega, w: CMat::from_element(1, 1, z / (one - z * a)), h: CMat::identity(1, 1) }
+            FrequencyPoint { omega, w: CMat::from_element(1, 1, z / (one - z * a)), h: CMat::identity(1, 1) }
         };
-        let problem = Problem::new(testbank::grid(301).into_iter().map(point).collect(), vec![80]);
+        let problem = SampledProblem::new(testbank::grid(301).into_iter().map(point).collect(), vec![80]);
         let s = solve("Nehari", &problem);
         let want = 1.0 / (1.0 - a * a);
         assert!((s.gamma - want).abs() < 1e-8 * want, "a = {a}: {} instead of {want}", s.gamma);
