@@ -90,7 +90,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let analysis = design::analyze(&bank, &delay_errors).in_file(&args.bank)?;
     let certified = args.certify.then(|| design::certify(&bank)).transpose().in_file(&args.bank)?;
     let worst_case = errors.map(|errors| BoxStudy::new(&bank, &errors)).transpose().in_file(&args.bank)?;
-    let report = Report {
+    let report = AnalysisReport {
         understood: bank.spec.as_ref().map(understood).unwrap_or_default(),
         is_normalised: bank.is_normalised(),
         scale: GammaScale::new(&bank, &delay_errors).in_file(&args.bank)?,
@@ -100,7 +100,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         with_errors: with_errors(&bank, &delay_errors).in_file(&args.bank)?,
         worst_case,
     };
-    show(&report, args.json, Report::text)
+    show(&report, args.json, AnalysisReport::text)
 }
 
 /// The figures with other delays; none without errors.
@@ -126,7 +126,7 @@ impl Args {
 }
 
 #[derive(Debug, serde::Serialize)]
-struct Report {
+struct AnalysisReport {
     /// The spec in units of the user.
     understood: String,
     #[serde(skip)]
@@ -145,7 +145,7 @@ struct Report {
     worst_case: Option<BoxStudy>,
 }
 
-impl Report {
+impl AnalysisReport {
     fn text(&self) -> String {
         let Analysis { gamma, peak_hertz, noncausal, mean } = self.analysis;
         let proof = self.certified.map_or_else(String::new, |proof| {

@@ -4,7 +4,7 @@ use super::before_after;
 use super::observer::RunObserver;
 use super::output::begin_samples;
 use super::print::{Failure, check_strict, failed, name, print, print_report, stopped, warn};
-use super::run::{Job, each_block};
+use super::run::{BankRun, each_block};
 use hybank::bank::Bank;
 use hybank::files::commit_all;
 use hybank::interchange::{BitTrue, WordSizes};
@@ -29,7 +29,7 @@ pub(super) struct BitTrueArgs {
 
 /// How the words were used.
 #[derive(Debug, serde::Serialize)]
-struct Report {
+struct BitTrueReport {
     samples: u64,
     rate: u64,
     frames: u64,
@@ -55,7 +55,7 @@ impl BitTrueArgs {
     /// Fuses all that `reader` gives.
     pub(super) fn fuse(
         self,
-        job: &Job<'_>,
+        job: &BankRun<'_>,
         reader: &mut MultiReader,
         observer: &mut RunObserver,
         measured: impl FnOnce() -> Result<Option<BeforeAfter>, Failure>,
@@ -69,11 +69,11 @@ impl BitTrueArgs {
         let header = OutputHeader { container: Container::Wav, format, is_complex: false, rate };
         let output = begin_samples(job.output, header, job.args.force).map_err(stopped)?;
         let skip = if job.dropped == DroppedLatency::All { job.bank.output_delay() } else { 0 };
-        let mut run = Run::new(model, output, format, skip, job.bank);
+        let mut run = ModelRun::new(model, output, format, skip, job.bank);
         each_block(reader, observer, |_, recordings| run.process(recordings))?;
         let frames = reader.consumed();
         run.flush()?;
-        let mut report = Report {
+        let mut report = BitTrueReport {
             samples: run.samples,
             rate: rate.round() as u64,
             frames,
@@ -133,7 +133,7 @@ fn integer_format(reader: &MultiReader) -> Result<PcmFormat, Failure> {
 }
 
 /// A model that runs.
-struct Run {
+struct ModelRun {
     model: BitTrue,
     output: SampleWriter,
     format: PcmFormat,
@@ -145,7 +145,7 @@ struct Run {
     samples: u64,
 }
 
-impl Run {
+impl ModelRun {
     fn new(model: BitTrue, output: SampleWriter, format: PcmFormat, skip: usize, bank: &Bank) -> Self {
         Self { model, output, format, skip, owed: skip, ratio: bank.ratio, samples: 0 }
     }

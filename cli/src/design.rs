@@ -1,7 +1,7 @@
 //! `hybank design`: from a spec file to a bank file.
 
 use super::bank_file::{bad_flag, load_spec};
-use super::design_report::{Judged, Report};
+use super::design_report::{DesignReport, JudgedBank};
 use super::design_studies::BandHint;
 use super::interrupt::interrupts;
 use super::print::{
@@ -11,7 +11,7 @@ use super::print::{
 use super::written::{check_output, write_text};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
-use hybank::design::{self, Design, DesignError, Options, Stage, Stop, TIME_LIMIT};
+use hybank::design::{self, Design, DesignError, DesignOptions, Stage, Stop, TIME_LIMIT};
 use hybank::messages::Quoted;
 use hybank::spec::{DesignOverrides, Method, Spec, WordLengths};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -154,7 +154,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let begin = Instant::now();
     let found = designed(args, &spec)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
-    let mut judged = Judged::new(&found.bank).in_file(&args.spec)?;
+    let mut judged = JudgedBank::new(&found.bank).in_file(&args.spec)?;
     if !args.force {
         judged.check_useful(&found.bank).in_file(&args.spec)?;
     }
@@ -166,7 +166,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     if !is_ended {
         judged.hint = BandHint::new(&found, seconds).in_file(&args.spec)?;
     }
-    let report = Report::new(args.output.display().to_string(), &found, judged, seconds);
+    let report = DesignReport::new(args.output.display().to_string(), &found, judged, seconds);
     if is_dash(&args.output) {
         say(&report.text(args.verbose));
         return Ok(());
@@ -186,7 +186,7 @@ fn designed(args: &Args, spec: &Spec) -> Result<Design, Failure> {
     };
     let observer = |stage| watch.note(stage);
     let stop = watch.stop.clone();
-    let options = Options { time_limit, observer: &observer, stop, ..Options::default() };
+    let options = DesignOptions { time_limit, observer: &observer, stop, ..DesignOptions::default() };
     watch.during(|| design::design(spec, &options)).in_file(&args.spec)
 }
 

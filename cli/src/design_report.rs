@@ -1,6 +1,6 @@
 //! The report of `hybank design` and `hybank import` on a finished bank, as text and as JSON.
 
-use super::design_studies::{BandHint, Words, known, number, order_text, robust_text};
+use super::design_studies::{BandHint, WordReport, known, number, order_text, robust_text};
 use hybank::bank::{Bank, Gamma, SynthesisFilters};
 use hybank::design::{
     Design, DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, analyze_mean,
@@ -16,7 +16,7 @@ use hybank::verify::Verified;
 
 /// The report; serialised it is that of `--json`.
 #[derive(Debug, serde::Serialize)]
-pub(super) struct Report<'a> {
+pub(super) struct DesignReport<'a> {
     bank: String,
     /// The spec in units of the user.
     understood: String,
@@ -33,12 +33,12 @@ pub(super) struct Report<'a> {
     gamma: &'a Gamma,
     /// For integer taps.
     #[serde(skip_serializing_if = "Option::is_none")]
-    words: Option<Words<'a>>,
+    words: Option<WordReport<'a>>,
     /// For a spec with `[uncertainty]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     robust: Option<&'a RobustStudy>,
     #[serde(flatten)]
-    judged: Judged,
+    judged: JudgedBank,
     /// Hertz, at the slow rate to which all frequencies alias.
     peak_hertz: Hertz,
     #[serde(skip)]
@@ -51,7 +51,7 @@ pub(super) struct Report<'a> {
 
 /// What is computed of a finished bank for its report.
 #[derive(Debug, serde::Serialize)]
-pub(super) struct Judged {
+pub(super) struct JudgedBank {
     #[serde(flatten)]
     pub(super) mean: MeanAnalysis,
     pub(super) scale: GammaScale,
@@ -61,7 +61,7 @@ pub(super) struct Judged {
     pub(super) hint: Option<BandHint>,
 }
 
-impl Judged {
+impl JudgedBank {
     /// Of a bank with its spec.
     pub(super) fn new(bank: &Bank) -> Result<Self, DesignError> {
         let (mean, scale) = (analyze_mean(bank)?, GammaScale::new(bank, &[])?);
@@ -126,9 +126,9 @@ impl ProofReport {
     }
 }
 
-impl<'a> Report<'a> {
+impl<'a> DesignReport<'a> {
     /// Of a bank written to `output`, designed in so many seconds.
-    pub(super) fn new(output: String, design: &'a Design, judged: Judged, seconds: f64) -> Self {
+    pub(super) fn new(output: String, design: &'a Design, judged: JudgedBank, seconds: f64) -> Self {
         let bank = &design.bank;
         let (taps, states) = match &bank.filters {
             SynthesisFilters::Fir(taps) => (taps.first().map(Vec::len), None),
@@ -147,7 +147,7 @@ impl<'a> Report<'a> {
             states,
             reduction: design.reduction.as_ref(),
             gamma: &bank.gamma,
-            words: Words::of(design),
+            words: WordReport::of(design),
             robust: design.robust.as_ref(),
             judged,
             peak_hertz: design.peak_frequency.in_hertz(bank.slow_period()),
@@ -171,7 +171,7 @@ impl<'a> Report<'a> {
             self.mean_text(),
             self.hint(),
             self.choice(),
-            self.words.as_ref().map(Words::text).unwrap_or_default(),
+            self.words.as_ref().map(WordReport::text).unwrap_or_default(),
             self.reduction.map(|reduction| order_text(reduction, self.method)).unwrap_or_default(),
             self.robust
                 .map(|study| robust_text(study, self.gamma.worst_case, self.proof.of_box()))
@@ -183,7 +183,7 @@ impl<'a> Report<'a> {
     }
 }
 
-impl Report<'_> {
+impl DesignReport<'_> {
     /// The sizes of the bank.
     fn heading(&self) -> String {
         let chosen = if self.latency_chosen { " (chosen; set `latency` to change it)" } else { "" };
@@ -200,7 +200,7 @@ impl Report<'_> {
 
     /// How integer taps were chosen for a loss.
     fn choice(&self) -> String {
-        self.words.as_ref().map(Words::choice_text).unwrap_or_default()
+        self.words.as_ref().map(WordReport::choice_text).unwrap_or_default()
     }
 
     fn hint(&self) -> String {

@@ -2,7 +2,7 @@
 
 use super::capture_file::unread;
 use super::print::{Failure, check_strict, failed, failed_at, is_dash, print, print_report, warn};
-use super::run::Job;
+use super::run::BankRun;
 use super::written::{Mono, begin_recording};
 use hybank::bank::Bank;
 use hybank::captures::Captures;
@@ -33,7 +33,7 @@ pub(super) struct TrackArgs {
 }
 
 #[derive(Debug, serde::Serialize)]
-struct Report {
+struct TrackedReport {
     samples: usize,
     rate: f64,
     predicted_snr_db: f64,
@@ -51,7 +51,7 @@ impl TrackArgs {
 }
 
 /// Fuses what `reader` gives by the delays of a table.
-pub(super) fn fuse(job: &Job<'_>, table: &Path, mut reader: MultiReader) -> Result<(), Failure> {
+pub(super) fn fuse(job: &BankRun<'_>, table: &Path, mut reader: MultiReader) -> Result<(), Failure> {
     let track = read(table, job.bank)?;
     let rate = job.output_rate(&reader)?;
     if reader.is_complex() {
@@ -94,7 +94,7 @@ fn read(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
 
 /// A line of `drift.jsonl`.
 #[derive(Debug, serde::Deserialize)]
-struct Line {
+struct DriftLine {
     frame: u64,
     /// D_i in seconds; of a channel of which the line says nothing none.
     delay: Vec<Option<f64>>,
@@ -105,7 +105,8 @@ fn read_lines(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
     let (mut times, mut delays) = (Vec::new(), vec![Vec::new(); bank.channel_count()]);
     for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let refused = |problem: String| failed_at(path, format!("line {}: {problem}", number + 1));
-        let Line { frame, delay } = serde_json::from_str(line).map_err(|error| refused(error.to_string()))?;
+        let DriftLine { frame, delay } =
+            serde_json::from_str(line).map_err(|error| refused(error.to_string()))?;
         if delay.len() != delays.len() {
             return Err(refused(format!("{} for {} channels", counted(delay.len(), "delay"), delays.len())));
         }
@@ -117,8 +118,8 @@ fn read_lines(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
     Ok(DelayTrack { times, delays })
 }
 
-fn report(job: &Job<'_>, tracked: &Tracked, rate: f64, warnings: Vec<String>) -> Result<(), Failure> {
-    let report = Report {
+fn report(job: &BankRun<'_>, tracked: &Tracked, rate: f64, warnings: Vec<String>) -> Result<(), Failure> {
+    let report = TrackedReport {
         samples: tracked.samples.len(),
         rate,
         predicted_snr_db: tracked.snr.0,

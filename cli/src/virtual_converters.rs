@@ -3,7 +3,7 @@
 use super::print::Failure;
 use hybank::io::PcmFormat;
 use hybank::quantity::{self, Time, readable};
-use hybank::simulate::{ConverterErrors, ErrorRule, ErrorsOfConverter, RefusedError};
+use hybank::simulate::{ErrorLists, ErrorRule, ErrorsOfConverter, RefusedError};
 use hybank::spec::{ChannelSpec, Spec};
 use hybank::units::Seconds;
 
@@ -43,8 +43,8 @@ pub(super) struct ErrorArgs {
 }
 
 impl ErrorArgs {
-    pub(super) fn errors(&self) -> ConverterErrors {
-        ConverterErrors {
+    pub(super) fn errors(&self) -> ErrorLists {
+        ErrorLists {
             noise: self.noise,
             bits: self.bits,
             jitter: self.jitter,
@@ -121,7 +121,7 @@ pub(super) fn integers(bits: Option<u32>) -> Option<PcmFormat> {
 
 impl CommonReport {
     /// Of the converters of a spec.
-    pub(super) fn new(errors: &ConverterErrors, spec: &Spec) -> Self {
+    pub(super) fn new(errors: &ErrorLists, spec: &Spec) -> Self {
         let jitter = errors.jitter.map_or(Seconds(0.0), |jitter| jitter.in_seconds(spec.fast_period));
         Self { noise: errors.noise, bits: errors.bits, jitter: jitter.0, seed: errors.seed }
     }

@@ -26,11 +26,11 @@ pub struct HeldOut {
 /// that predict it. Their covariances are computed once, for whatever noise.
 #[derive(Debug, Clone)]
 pub struct Trials {
-    trials: Vec<Trial>,
+    trials: Vec<HeldOutSamples>,
 }
 
 #[derive(Debug, Clone)]
-struct Trial {
+struct HeldOutSamples {
     samples: Vec<TimedSample>,
     values: Vec<f64>,
     /// Those that are left out.
@@ -51,7 +51,8 @@ impl Trials {
         power: f64,
         instants: &[FastPeriods],
     ) -> Self {
-        let trial = |instant: &FastPeriods| Trial::new(estimator, recordings, reach, power, *instant);
+        let trial =
+            |instant: &FastPeriods| HeldOutSamples::new(estimator, recordings, reach, power, *instant);
         Self { trials: instants.par_iter().map(trial).collect() }
     }
 
@@ -70,7 +71,7 @@ impl Trials {
     }
 }
 
-impl Trial {
+impl HeldOutSamples {
     fn new(
         estimator: &Estimator,
         recordings: &[Recording],

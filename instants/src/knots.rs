@@ -8,7 +8,7 @@
 
 use super::demand::Outputs;
 use super::estimator::{Estimator, EstimatorTaps, MeanSquare, TimedSample};
-use super::fusion::Grid;
+use super::fusion::OutputGrid;
 use super::recording::Recording;
 use hybank_core::units::FastPeriods;
 use hybank_linalg::{LinalgError, Mat, dot};
@@ -24,7 +24,7 @@ const STANDSTILL: f64 = 1e-9;
 pub(super) struct Stretch<'a> {
     estimator: &'a Estimator,
     recordings: &'a [Recording],
-    grid: Grid,
+    grid: OutputGrid,
     /// Samples of each recording on either side.
     reach: usize,
     /// The first of the samples of each recording for frame 0; it need not be there.
@@ -48,7 +48,7 @@ impl<'a> Stretch<'a> {
     pub(super) fn new(
         estimator: &'a Estimator,
         recordings: &'a [Recording],
-        grid: Grid,
+        grid: OutputGrid,
         reach: usize,
         frames: Range<usize>,
     ) -> Result<Self, LinalgError> {

@@ -1,7 +1,7 @@
 //! Arrays as inputs of a bank, without a copy.
 
 use crate::errors::{capture_error, refused};
-use crate::formats::Format;
+use crate::formats::ArrayFormat;
 use hybank::bank::FrameLayout;
 use hybank::captures::Captures;
 use hybank::runtime::{PcmFrames, SampleLayout};
@@ -15,7 +15,7 @@ use pyo3::types::{PyDict, PyList, PySlice, PyTuple};
 
 /// What an array of samples must look like.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shape {
+pub(crate) struct ArrayShape {
     /// The axis of time, as NumPy counts: 0 or -2, 1 or -1.
     pub(crate) axis: isize,
     /// N.
@@ -24,7 +24,7 @@ pub(crate) struct Shape {
 
 /// How samples lie in memory.
 #[derive(Debug, Clone, Copy)]
-struct Layout {
+struct ArrayLayout {
     channels: usize,
     frames: usize,
     order: Order,
@@ -43,20 +43,20 @@ enum Order {
 pub(crate) struct Held<'py> {
     /// Along the axis that varies fastest.
     bytes: PyReadonlyArrayDyn<'py, u8>,
-    layout: Layout,
-    pub(crate) format: Format,
+    layout: ArrayLayout,
+    pub(crate) format: ArrayFormat,
 }
 
 impl<'py> Held<'py> {
     /// Holds `x`: any array whose samples lie frame after frame or channel after channel is read where it
     /// is, also a slice along time of the latter. Others (slices with steps, foreign byte orders, float16,
     /// lists) are copied first.
-    pub(crate) fn new(x: &Bound<'py, PyAny>, shape: Shape) -> PyResult<Self> {
+    pub(crate) fn new(x: &Bound<'py, PyAny>, shape: ArrayShape) -> PyResult<Self> {
         let Ok(array) = x.cast_exact::<PyUntypedArray>() else {
             return Self::new(&plain(x)?, shape);
         };
         let [channels, frames] = shape.of(array)?;
-        let Ok(format) = Format::of_dtype(array.dtype().as_any()) else {
+        let Ok(format) = ArrayFormat::of_dtype(array.dtype().as_any()) else {
             return Self::converted(array, shape);
         };
         let (by_rows, by_columns) = (array.is_c_contiguous(), array.is_fortran_contiguous());
@@ -74,11 +74,11 @@ impl<'py> Held<'py> {
         let rows = if is_turned { x.getattr("T")? } else { x.clone() };
         let bytes = rows.call_method1("view", ("u1",))?;
         let bytes = bytes.cast::<PyArrayDyn<u8>>()?.try_readonly().map_err(refused)?;
-        Ok(Self { bytes, layout: Layout { channels, frames, order }, format })
+        Ok(Self { bytes, layout: ArrayLayout { channels, frames, order }, format })
     }
 
     /// From another byte order, or from floats of half precision.
-    fn converted(array: &Bound<'py, PyUntypedArray>, shape: Shape) -> PyResult<Self> {
+    fn converted(array: &Bound<'py, PyUntypedArray>, shape: ArrayShape) -> PyResult<Self> {
         let dtype = array.getattr("dtype")?;
         if !dtype.getattr("isnative")?.extract::<bool>()? {
             let native = dtype.call_method1("newbyteorder", ("=",))?;
@@ -118,7 +118,9 @@ impl<'py> Held<'py> {
 
     /// The samples as a recorder has them; the parts of complex ones take turns.
     pub(crate) fn recordings(&self) -> PyResult<Vec<PcmFrames<'_>>> {
-        let Self { layout: Layout { channels, order, .. }, format: Format { number, complex }, .. } = *self;
+        let Self {
+            layout: ArrayLayout { channels, order, .. }, format: ArrayFormat { number, complex }, ..
+        } = *self;
         let layout = SampleLayout::packed(number);
         let parts = 1 + usize::from(complex);
         let frames = |bytes, channels| PcmFrames { layout, channels: parts * channels, bytes };
@@ -138,7 +140,7 @@ impl<'py> Held<'py> {
     }
 }
 
-impl Shape {
+impl ArrayShape {
     fn time_first(self) -> bool {
         matches!(self.axis, 0 | -2)
     }
@@ -193,8 +195,8 @@ pub(crate) fn framed<'py>(
     layout: &FrameLayout,
     axis: isize,
     is_whole: bool,
-) -> PyResult<(Bound<'py, PyAny>, Shape)> {
-    let shape = Shape { axis, channels: layout.count() };
+) -> PyResult<(Bound<'py, PyAny>, ArrayShape)> {
+    let shape = ArrayShape { axis, channels: layout.count() };
     let converters = layout.samples();
     let given: Vec<Bound<'py, PyAny>> = match (x.cast::<PyList>(), x.cast::<PyTuple>()) {
         _ if layout.is_plain() => return Ok((x.clone(), shape)),
@@ -234,7 +236,7 @@ pub(crate) fn framed<'py>(
         rows.push(part.call_method1("reshape", (frames, *samples))?);
     }
     let all = numpy.call_method1("concatenate", (PyList::new(x.py(), rows)?, 1))?;
-    Ok((samples_of(&given[0], all)?, Shape { axis: 0, ..shape }))
+    Ok((samples_of(&given[0], all)?, ArrayShape { axis: 0, ..shape }))
 }
 
 /// The array of a list, of an object of another package, or of a subclass.

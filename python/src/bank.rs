@@ -3,7 +3,7 @@
 use crate::arrays::{framed, matrix, read_only};
 use crate::background;
 use crate::errors::{choose, refused};
-use crate::fuse::{self, Request, parse_algorithm};
+use crate::fuse::{self, FuseRequest, parse_algorithm};
 use crate::hardware::{self, CircuitKeywords};
 use crate::outputs::write_file;
 use crate::pictures;
@@ -292,7 +292,7 @@ impl Bank {
         }
         let bank = &slf.get().bank;
         let (frames, shape) = framed(x, &bank.layout(), axis, false)?;
-        let request = Request {
+        let request = FuseRequest {
             workers: fuse::workers(threads)?,
             gaps: fuse::gaps(py, bank, gaps)?,
             algorithm: parse_algorithm(algorithm)?,

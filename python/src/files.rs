@@ -18,7 +18,7 @@ const MOST: usize = 1 << 32;
 /// How files are read, by the names of the command line.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub(crate) struct Options {
+pub(crate) struct CaptureOptions {
     format: String,
     channels: Option<usize>,
     channel: Option<usize>,
@@ -50,7 +50,7 @@ fn in_turn(of: &Converters<'_>, converters: usize) -> PyResult<TimeInterleaving>
 pub(crate) fn read<'py>(
     py: Python<'py>,
     files: Vec<PathBuf>,
-    options: Options,
+    options: CaptureOptions,
     source: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     match source {
@@ -64,7 +64,7 @@ pub(crate) fn read<'py>(
 fn read_for<'py>(
     py: Python<'py>,
     files: &[PathBuf],
-    options: &Options,
+    options: &CaptureOptions,
     converters: Option<&Converters<'_>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let turns = options.interleaved.zip(converters);
@@ -101,7 +101,7 @@ fn read_for<'py>(
     Ok(found)
 }
 
-impl Options {
+impl CaptureOptions {
     fn format(&self) -> PyResult<FileFormat> {
         Ok(FileFormat {
             coding: self.format.parse().map_err(|error| refused(format!("format: {error}")))?,

@@ -7,24 +7,24 @@ use pyo3::prelude::*;
 
 /// A number type of samples in the byte order of this machine, and whether two of them are a complex sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Format {
+pub(crate) struct ArrayFormat {
     pub(crate) number: PcmFormat,
     pub(crate) complex: bool,
 }
 
 /// The formats by the names that NumPy has for them.
-const FORMATS: [(&str, Format); 8] = [
-    ("f4", Format::F32),
-    ("f8", Format::native(PcmFormat::F64Le, false)),
-    ("i1", Format::native(PcmFormat::S8, false)),
-    ("u1", Format::native(PcmFormat::U8, false)),
-    ("i2", Format::native(PcmFormat::S16Le, false)),
-    ("i4", Format::native(PcmFormat::S32Le, false)),
-    ("c8", Format::native(PcmFormat::F32Le, true)),
-    ("c16", Format::native(PcmFormat::F64Le, true)),
+const FORMATS: [(&str, ArrayFormat); 8] = [
+    ("f4", ArrayFormat::F32),
+    ("f8", ArrayFormat::native(PcmFormat::F64Le, false)),
+    ("i1", ArrayFormat::native(PcmFormat::S8, false)),
+    ("u1", ArrayFormat::native(PcmFormat::U8, false)),
+    ("i2", ArrayFormat::native(PcmFormat::S16Le, false)),
+    ("i4", ArrayFormat::native(PcmFormat::S32Le, false)),
+    ("c8", ArrayFormat::native(PcmFormat::F32Le, true)),
+    ("c16", ArrayFormat::native(PcmFormat::F64Le, true)),
 ];
 
-impl Format {
+impl ArrayFormat {
     /// Real samples in f32.
     pub(crate) const F32: Self = Self::native(PcmFormat::F32Le, false);
 

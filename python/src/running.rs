@@ -1,7 +1,7 @@
 //! The run of a stream, through the pipeline of the command line.
 
 use crate::errors::refused;
-use crate::formats::Format;
+use crate::formats::ArrayFormat;
 use hybank::bank::Bank;
 use hybank::io::IoError;
 use hybank::pipeline::{Block, DroppedLatency, GapEstimator, Pipeline, Settings};
@@ -20,7 +20,12 @@ pub(crate) struct Running {
 
 impl Running {
     /// A run of `bank` at its beginning.
-    pub(crate) fn new(bank: &Bank, plan: &Plan, format: Format, gaps: Option<Arc<dyn GapEstimator>>) -> Self {
+    pub(crate) fn new(
+        bank: &Bank,
+        plan: &Plan,
+        format: ArrayFormat,
+        gaps: Option<Arc<dyn GapEstimator>>,
+    ) -> Self {
         let settings = Settings { dropped: DroppedLatency::Nothing, gaps, ..Settings::default() };
         let pipeline = Pipeline::new(bank, plan, settings, format.number, format.complex);
         Self { pipeline, mask: Vec::new(), is_closed: false }

@@ -1,9 +1,9 @@
 //! `hybank.Stream`: a causal stream, block by block.
 
-use crate::arrays::{Held, Shape, framed};
+use crate::arrays::{ArrayShape, Held, framed};
 use crate::bank::Bank as PyBank;
 use crate::errors::{no_others, refused};
-use crate::formats::Format;
+use crate::formats::ArrayFormat;
 use crate::fuse::{gap, marks, parse_algorithm, plan};
 use crate::outputs::NewArray;
 use crate::running::Running;
@@ -24,8 +24,8 @@ pub(crate) struct Stream {
     /// As it was asked for.
     asked: String,
     plan: Plan,
-    shape: Shape,
-    format: Format,
+    shape: ArrayShape,
+    format: ArrayFormat,
     gaps: Option<Arc<dyn GapEstimator>>,
     running: Mutex<Running>,
 }
@@ -42,8 +42,8 @@ impl Stream {
         algorithm: &str,
         gaps: Option<Arc<dyn GapEstimator>>,
     ) -> PyResult<Self> {
-        let format = dtype.map_or(Ok(Format::F32), Format::of_dtype)?;
-        let shape = Shape { axis, channels: bank.frame_samples() };
+        let format = dtype.map_or(Ok(ArrayFormat::F32), ArrayFormat::of_dtype)?;
+        let shape = ArrayShape { axis, channels: bank.frame_samples() };
         shape.check()?;
         let asked = parse_algorithm(algorithm)?.without_added_latency();
         let plan = plan(bank, format, asked)?;
@@ -257,7 +257,7 @@ impl Stream {
         }
     }
 
-    fn check_parts(&self, given: Format) -> PyResult<()> {
+    fn check_parts(&self, given: ArrayFormat) -> PyResult<()> {
         match (given.complex, self.format.complex) {
             (true, false) => Err(refused(
                 "the samples are complex, the stream is real; make it with bank.stream(dtype=\"c8\") or \"c16\"",

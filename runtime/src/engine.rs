@@ -7,23 +7,23 @@
 #[cfg(feature = "rayon")]
 use crate::adapters::SplitOutput;
 use crate::adapters::{InputFrames, OutputFrames};
-use crate::algorithms::{Direct, Facts, Filter, OverlapSave, Recursive};
+use crate::algorithms::{AlgorithmFacts, Direct, Filter, OverlapSave, Recursive};
 use crate::sample::Sample;
-use crate::state::{Count, Numbers};
+use crate::state::{Count, StateNumbers};
 use std::sync::Arc;
 
 /// A filter with its state, in the number type of its sums.
 #[derive(Debug, Clone)]
 pub(crate) enum Engine {
-    F32(Fir<f32>),
-    F64(Fir<f64>),
+    F32(FirAlgorithm<f32>),
+    F64(FirAlgorithm<f64>),
     /// A recursion feeds its rounding errors back: always in f64.
     Recursive(StatefulFilter<Recursive>),
 }
 
 /// One of the algorithms for FIR filters.
 #[derive(Debug, Clone)]
-pub(crate) enum Fir<T: Sample> {
+pub(crate) enum FirAlgorithm<T: Sample> {
     Direct(StatefulFilter<Direct<T>>),
     OverlapSave(StatefulFilter<OverlapSave<T>>),
 }
@@ -39,10 +39,10 @@ pub(crate) struct StatefulFilter<F: Filter> {
 macro_rules! each {
     ($engine:expr, $it:ident => $body:expr) => {
         match $engine {
-            Engine::F32(Fir::Direct($it)) => $body,
-            Engine::F32(Fir::OverlapSave($it)) => $body,
-            Engine::F64(Fir::Direct($it)) => $body,
-            Engine::F64(Fir::OverlapSave($it)) => $body,
+            Engine::F32(FirAlgorithm::Direct($it)) => $body,
+            Engine::F32(FirAlgorithm::OverlapSave($it)) => $body,
+            Engine::F64(FirAlgorithm::Direct($it)) => $body,
+            Engine::F64(FirAlgorithm::OverlapSave($it)) => $body,
             Engine::Recursive($it) => $body,
         }
     };
@@ -50,7 +50,7 @@ macro_rules! each {
 
 impl Engine {
     /// See [`Filter::facts`].
-    pub(crate) fn facts(&self) -> Facts {
+    pub(crate) fn facts(&self) -> AlgorithmFacts {
         each!(self, it => it.filter.facts())
     }
 
@@ -74,8 +74,8 @@ impl Engine {
     ) -> u64 {
         use crate::parallel::process;
         match self {
-            Self::F32(Fir::Direct(it)) => process(&*it.filter, &mut it.state, input, output, pool),
-            Self::F64(Fir::Direct(it)) => process(&*it.filter, &mut it.state, input, output, pool),
+            Self::F32(FirAlgorithm::Direct(it)) => process(&*it.filter, &mut it.state, input, output, pool),
+            Self::F64(FirAlgorithm::Direct(it)) => process(&*it.filter, &mut it.state, input, output, pool),
             _ => self.process(input, output),
         }
     }
@@ -102,7 +102,7 @@ impl Engine {
 
     /// The state `place` frames after a multiple of the alignment that [`Engine::save`] gave as `numbers`,
     /// after so many `resets`. Does not allocate.
-    pub(crate) fn resume(&mut self, place: usize, numbers: Numbers<'_>, resets: u64) {
+    pub(crate) fn resume(&mut self, place: usize, numbers: StateNumbers<'_>, resets: u64) {
         each!(self, it => it.filter.resume(&mut it.state, place, numbers));
         if let Self::Recursive(it) = self {
             it.state.resets = resets;

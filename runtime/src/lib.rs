@@ -1,9 +1,10 @@
 #![doc = include_str!("../README.md")]
 //!
-//! Samples need not be interleaved: [`Stream::run`] takes any [`InputFrames`] and gives to any [`OutputFrames`], such as
-//! a slice per channel ([`Planar`]) and recordings as they lie in files ([`PcmFrames`], [`PcmOutput`]).
-//! Complex samples (IQ) are two streams through one plan, one for the real parts and one for the imaginary
-//! ones, which [`PcmFrames::part`] and `PcmOutput::part` pick out by a stride.
+//! Samples need not be interleaved: [`Stream::run`] takes any [`InputFrames`] and gives to any
+//! [`OutputFrames`], such as a slice per channel ([`Planar`]) and recordings as they lie in files
+//! ([`PcmFrames`], [`PcmOutput`]). Complex samples (IQ) are two streams through one plan, one for the real
+//! parts and one for the imaginary ones, which [`PcmFrames::part`] and `PcmOutput::part` pick out by a
+//! stride.
 //!
 //! ```
 //! use hybank_runtime::{Options, PcmFormat, PcmFrames, PcmOutput, Planar, Plan, SampleLayout, Stream};

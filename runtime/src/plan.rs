@@ -2,8 +2,8 @@
 
 use crate::adapters::Offsets;
 use crate::algorithms::choice::{ChosenAlgorithm, check_recursive};
-use crate::algorithms::{Direct, Facts, OverlapSave, Recursive};
-use crate::engine::{Engine, Fir, StatefulFilter};
+use crate::algorithms::{AlgorithmFacts, Direct, OverlapSave, Recursive};
+use crate::engine::{Engine, FirAlgorithm, StatefulFilter};
 use crate::state::Digest;
 use crate::{Algorithm, BuildError, Isa, Precision, Sample, Shape, StateMatrices};
 use std::sync::Arc;
@@ -57,7 +57,7 @@ pub struct PlanSummary {
 pub struct Plan {
     /// With a state at its beginning.
     start: Arc<Engine>,
-    facts: Facts,
+    facts: AlgorithmFacts,
     channels: usize,
     ratio: usize,
     latency: usize,
@@ -212,7 +212,7 @@ impl Plan {
 
     /// How the bank runs.
     pub fn summary(&self) -> PlanSummary {
-        let Facts { name, transform, multiply_adds, .. } = self.facts;
+        let AlgorithmFacts { name, transform, multiply_adds, .. } = self.facts;
         PlanSummary {
             algorithm: name,
             numbers: self.start.numbers(),
@@ -226,11 +226,16 @@ impl Plan {
 }
 
 impl ChosenAlgorithm {
-    fn filter<T: Sample>(self, taps: &[Vec<f64>], ratio: usize, isa: Isa) -> Result<Fir<T>, BuildError> {
+    fn filter<T: Sample>(
+        self,
+        taps: &[Vec<f64>],
+        ratio: usize,
+        isa: Isa,
+    ) -> Result<FirAlgorithm<T>, BuildError> {
         Ok(match self {
-            Self::Direct => Fir::Direct(StatefulFilter::new(Direct::new(taps, ratio, isa)?)),
+            Self::Direct => FirAlgorithm::Direct(StatefulFilter::new(Direct::new(taps, ratio, isa)?)),
             Self::OverlapSave(shape) => {
-                Fir::OverlapSave(StatefulFilter::new(OverlapSave::new(taps, shape, isa)?))
+                FirAlgorithm::OverlapSave(StatefulFilter::new(OverlapSave::new(taps, shape, isa)?))
             }
         })
     }

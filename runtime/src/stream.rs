@@ -4,7 +4,7 @@
 use crate::adapters::SplitOutput;
 use crate::adapters::{InputFrames, Interleaved, OutputFrames, WithoutOffsets, Zeros};
 use crate::engine::Engine;
-use crate::state::{Count, Header, Numbers};
+use crate::state::{Count, StateHeader, StateNumbers};
 use crate::{Plan, ProcessError, Sample, StateError};
 
 /// Filters the frames of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0 before the
@@ -162,13 +162,14 @@ impl Stream {
     /// Bytes of the [state](Stream::state) at this frame. Plans of FIR filters keep their history;
     /// overlap-save keeps a batch too, and a recursion its states.
     pub fn state_bytes(&self) -> usize {
-        Header::bytes(self.count(self.position))
+        StateHeader::bytes(self.count(self.position))
     }
 
     /// Appends the [state](Stream::state) to `bytes`. Allocates only where these have no room for it.
     pub fn save(&self, bytes: &mut Vec<u8>) {
         let Self { position, replaced, .. } = *self;
-        let header = Header { position, replaced, resets: self.state_resets(), digest: self.plan.digest() };
+        let header =
+            StateHeader { position, replaced, resets: self.state_resets(), digest: self.plan.digest() };
         header.write(self.plan.alignment(), bytes);
         let mut put = |number: f64| bytes.extend_from_slice(&number.to_le_bytes());
         self.engine.save(&mut put);
@@ -189,9 +190,9 @@ impl Stream {
     }
 
     /// The parts of a state of this plan.
-    fn read<'a>(&self, state: &'a [u8]) -> Result<(Header, Numbers<'a>), StateError> {
+    fn read<'a>(&self, state: &'a [u8]) -> Result<(StateHeader, StateNumbers<'a>), StateError> {
         let count = |place: usize| self.count(place as u64);
-        Header::read(state, self.plan.digest(), self.plan.alignment(), count)
+        StateHeader::read(state, self.plan.digest(), self.plan.alignment(), count)
     }
 
     /// Numbers of the state at a frame.

@@ -16,7 +16,7 @@
 use super::AnalogError;
 use super::realise::{Chain, SeriesBlock};
 use super::roots::Roots;
-use super::section::{Realisation, Section};
+use super::section::{AnalogSection, Realisation};
 use crate::arithmetic::{Ball, Float512};
 use crate::spec::FilterSpec;
 use crate::units::Seconds;
@@ -41,9 +41,9 @@ impl CutoffRemainder {
             SeriesBlock::Section(section) => Some(section),
             SeriesBlock::State(_) => None,
         });
-        let Some(sections) = sections.collect::<Option<Vec<Section<Long>>>>() else { return Ok(None) };
+        let Some(sections) = sections.collect::<Option<Vec<AnalogSection<Long>>>>() else { return Ok(None) };
         let share = beyond_first_order(&sections, Ball::from(error));
-        let damped = |section: Section<Long>| Section { zeros: damped(section.zeros), ..section };
+        let damped = |section: AnalogSection<Long>| AnalogSection { zeros: damped(section.zeros), ..section };
         let blocks = sections.into_iter().map(damped).map(SeriesBlock::Section).collect();
         Ok(share.map(|share| Self { filter: Chain { gain, blocks }.realise(), share }))
     }
@@ -64,10 +64,10 @@ fn damped(zeros: Roots<Long>) -> Roots<Long> {
 }
 
 /// An upper bound of G(x) - G(0) - x G'(0).
-fn beyond_first_order(sections: &[Section<Long>], x: Long) -> Option<f64> {
+fn beyond_first_order(sections: &[AnalogSection<Long>], x: Long) -> Option<f64> {
     let one = Ball::from(1.0);
     let (mut value, mut constant, mut slope) = (one, one, Ball::ZERO);
-    for Section { poles, zeros } in sections {
+    for AnalogSection { poles, zeros } in sections {
         for c in moduli(*zeros, one, |_, _| Ball::from(2.0).sqrt()) {
             (value, constant, slope) = (value * (c + x), constant * c, slope + one / c);
         }

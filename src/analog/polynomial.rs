@@ -12,7 +12,7 @@ use crate::linalg::{self, Complex, Mat};
 
 use super::AnalogError;
 use super::roots::RootSet;
-use super::square_free::{Factor, square_free_factors};
+use super::square_free::{SquareFreeFactor, square_free_factors};
 
 /// Relative error of a coefficient of a square-free factor.
 const COEFFICIENT_ERROR: f64 = 2.0 * Float512::ROUNDING;
@@ -44,7 +44,7 @@ pub(super) fn enclosed_roots(
     let significant = coefficients.iter().rposition(|&x| x != 0.0).map_or(0, |last| last + 1);
     let mut roots = RootSet::default();
     roots.real.resize(coefficients.len() - significant, Ball::ZERO);
-    for Factor { coefficients, multiplicity } in square_free_factors(&coefficients[..significant]) {
+    for SquareFreeFactor { coefficients, multiplicity } in square_free_factors(&coefficients[..significant]) {
         let simple = isolated(&coefficients).ok_or(AnalogError::RootsNotIsolated { what })?;
         for _ in 0..multiplicity {
             roots.real.extend(&simple.real);

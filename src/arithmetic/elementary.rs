@@ -50,7 +50,9 @@ fn inverse_tangent(n: f64, sign: f64) -> Long {
 
 /// e^x - 1, relatively accurate for small x too.
 pub(crate) fn exp_m1(x: Long) -> Long {
-    let Some(Reduced { terms, remainder, halvings }) = Reduced::new(x) else { return Ball::unknown() };
+    let Some(ExponentialSeries { terms, remainder, halvings }) = ExponentialSeries::new(x) else {
+        return Ball::unknown();
+    };
     let series = terms[1..].iter().rev().fold(Ball::ZERO, |sum, &term| sum + term);
     // e^2r - 1 = (e^r - 1) (e^r - 1 + 2).
     (0..halvings).fold(series.widened(remainder), |y, _| y * (y + Ball::from(2.0)))
@@ -58,7 +60,7 @@ pub(crate) fn exp_m1(x: Long) -> Long {
 
 /// cos x + i sin x.
 pub(crate) fn phasor(x: Long) -> ComplexBall {
-    let Some(Reduced { terms, remainder, halvings }) = Reduced::new(x) else {
+    let Some(ExponentialSeries { terms, remainder, halvings }) = ExponentialSeries::new(x) else {
         return ComplexBall::new(Ball::unknown(), Ball::unknown());
     };
     let sum = |first: usize| {
@@ -71,13 +73,13 @@ pub(crate) fn phasor(x: Long) -> ComplexBall {
 }
 
 /// The terms r^k / k! of the exponential series for x = r 2^`halvings`, and a bound of what they leave out.
-struct Reduced {
+struct ExponentialSeries {
     terms: Vec<Long>,
     remainder: f64,
     halvings: usize,
 }
 
-impl Reduced {
+impl ExponentialSeries {
     /// `None` for an argument that is unknown or too large.
     fn new(x: Long) -> Option<Self> {
         let mut size = x.magnitude();

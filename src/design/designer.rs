@@ -2,9 +2,9 @@
 
 use super::limits::{Stage, Stop, TIME_LIMIT, remedy};
 use super::methods::robust_fir::RobustStudy;
-use super::methods::{self, Settings, Synthesis};
+use super::methods::{self, MethodSettings, Synthesis};
 use super::plant::LiftedPlant;
-use super::preparation::{Comparison, merged, settings};
+use super::preparation::{SizingControl, merged, settings};
 use super::problem::Problem;
 use super::quantise::WordStudy;
 use super::realise::{Realised, realise};
@@ -55,7 +55,7 @@ pub enum ProofSearch {
 
 /// How a design runs.
 #[derive(Clone)]
-pub struct Options<'a> {
+pub struct DesignOptions<'a> {
     /// Whether a proof is searched.
     pub proof: ProofSearch,
     /// The time after which the design ends with what it has.
@@ -66,7 +66,7 @@ pub struct Options<'a> {
     pub stop: Stop,
 }
 
-impl Default for Options<'_> {
+impl Default for DesignOptions<'_> {
     /// With the search for a proof, limited to [`TIME_LIMIT`] and unobserved.
     fn default() -> Self {
         let (proof, time_limit, stop) = (ProofSearch::Run, Some(TIME_LIMIT), Stop::default());
@@ -74,7 +74,7 @@ impl Default for Options<'_> {
     }
 }
 
-impl Options<'_> {
+impl DesignOptions<'_> {
     /// The default without the search for a proof.
     pub fn without_proof() -> Self {
         Self { proof: ProofSearch::Skip, ..Self::default() }
@@ -83,9 +83,9 @@ impl Options<'_> {
 
 /// Designs the bank that `spec` asks for, with the proof of its gammas. `options` say how.
 ///
-/// A design that reaches its time limit or is ended by [`Options::stop`] gives the best bank so far, whose
-/// gamma may lie above the least; [`Design::proof`] is then [`DesignError::Stopped`]. It ends between two
-/// steps of its searches or two sample points of an interior-point method; a single equation or norm is
+/// A design that reaches its time limit or is ended by [`DesignOptions::stop`] gives the best bank so far,
+/// whose gamma may lie above the least; [`Design::proof`] is then [`DesignError::Stopped`]. It ends between
+/// two steps of its searches or two sample points of an interior-point method; a single equation or norm is
 /// computed to its end.
 ///
 /// # Errors
@@ -93,7 +93,7 @@ impl Options<'_> {
 /// end, a comparison method does not apply, no bank was found for numerical reasons, or the design was ended
 /// before there was one: [`DesignError::StoppedWithoutBank`]. A bank without a proof is not an error: see
 /// [`Design::proof`].
-pub fn design(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
+pub fn design(spec: &Spec, options: &DesignOptions<'_>) -> Result<Design, DesignError> {
     spec.check()?;
     designed(&filled_in(spec), options).map_err(|error| match error {
         DesignError::Stopped => DesignError::StoppedWithoutBank { remedy: remedy(spec) },
@@ -110,14 +110,14 @@ fn filled_in(spec: &Spec) -> Spec {
     filled
 }
 
-fn designed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
+fn designed(spec: &Spec, options: &DesignOptions<'_>) -> Result<Design, DesignError> {
     let stop = options.stop.within(options.time_limit);
     let problem = Problem::before_sizing(spec)?;
     let observer = |designs| (options.observer)(Stage::Latency { designs });
-    let sizing = Sizing::new(spec, &problem, Comparison { observer: &observer, stop: &stop })?;
+    let sizing = Sizing::new(spec, &problem, SizingControl { observer: &observer, stop: &stop })?;
     let problem = Problem { latency: sizing.latency, ..problem };
     (options.observer)(Stage::Filters);
-    let settings = Settings { stop: stop.clone(), ..settings(spec, sizing.taps)? };
+    let settings = MethodSettings { stop: stop.clone(), ..settings(spec, sizing.taps)? };
     let apart = settings.robust.is_some() || !settings.deviations.is_empty();
     let merged = merged(spec, &problem, apart)?;
     let plant = LiftedPlant::new(&merged.problem);

@@ -41,7 +41,7 @@ pub(super) trait AffineError {
     type Scenario: Clone + PartialEq + std::fmt::Debug;
 
     /// W and H at a location.
-    fn at(&self, location: &Location<Self::Scenario>) -> FrequencyPoint;
+    fn at(&self, location: &GridFrequency<Self::Scenario>) -> FrequencyPoint;
 
     /// The local maxima of `sigma_max(K)` over the frequencies for the unknowns `taps`, in any order. Those
     /// up to `level` may be left out.
@@ -50,13 +50,13 @@ pub(super) trait AffineError {
 
 /// A frequency in one of the scenarios.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Location<S> {
+pub(super) struct GridFrequency<S> {
     /// Radians per lag.
     pub(super) frequency: f64,
     pub(super) scenario: S,
 }
 
-impl<S: PartialEq> Location<S> {
+impl<S: PartialEq> GridFrequency<S> {
     pub(super) fn is_near(&self, other: &Self) -> bool {
         (self.frequency - other.frequency).abs() <= LEAST_DISTANCE && self.scenario == other.scenario
     }
@@ -66,12 +66,12 @@ impl<S: PartialEq> Location<S> {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LocatedPeak<S> {
     pub(super) gain: f64,
-    pub(super) location: Location<S>,
+    pub(super) location: GridFrequency<S>,
 }
 
 impl From<Peak> for LocatedPeak<()> {
     fn from(Peak { gain, frequency }: Peak) -> Self {
-        Self { gain, location: Location { frequency, scenario: () } }
+        Self { gain, location: GridFrequency { frequency, scenario: () } }
     }
 }
 
@@ -199,7 +199,7 @@ impl<'a> ErrorGrid<'a> {
 impl AffineError for ErrorGrid<'_> {
     type Scenario = ();
 
-    fn at(&self, location: &Location<()>) -> FrequencyPoint {
+    fn at(&self, location: &GridFrequency<()>) -> FrequencyPoint {
         self.plant.at(location.frequency)
     }
 

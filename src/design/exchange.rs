@@ -21,7 +21,7 @@
 //! exchange methods.
 
 use super::DesignError;
-use super::error_grid::{AffineError, Location};
+use super::error_grid::{AffineError, GridFrequency};
 use super::limits::Stop;
 use crate::linalg;
 use crate::lmi::FINEST_GAP;
@@ -89,7 +89,7 @@ pub(super) struct ExchangeCandidate<S> {
     /// Estimate of their gamma; equal to gamma if no peak was missed.
     pub(super) estimate: f64,
     /// The locations of the peaks that belong among the points.
-    above: Vec<Location<S>>,
+    above: Vec<GridFrequency<S>>,
 }
 
 /// The solution on the points.
@@ -106,7 +106,7 @@ pub(super) struct Exchange<E: AffineError> {
     pub(super) error: E,
     problem: SampledProblem,
     /// Of the points of the problem, in the order in which they were added.
-    pub(super) locations: Vec<Location<E::Scenario>>,
+    pub(super) locations: Vec<GridFrequency<E::Scenario>>,
     /// Added points have the weight zero.
     objective: MeanSquareObjective,
     gamma_margin: f64,
@@ -135,7 +135,7 @@ impl<E: AffineError> Exchange<E> {
     ) -> Self {
         let frequencies = problem.points().iter().map(|point| point.omega);
         let located =
-            frequencies.zip(scenarios).map(|(frequency, scenario)| Location { frequency, scenario });
+            frequencies.zip(scenarios).map(|(frequency, scenario)| GridFrequency { frequency, scenario });
         let locations = located.collect();
         let gamma_margin = gamma_margin.max(LEAST_MARGIN);
         Self {
@@ -174,7 +174,7 @@ impl<E: AffineError> Exchange<E> {
     }
 
     /// Adds points at the given locations, except where there is one. Returns whether any was added.
-    pub(super) fn add(&mut self, locations: &[Location<E::Scenario>]) -> bool {
+    pub(super) fn add(&mut self, locations: &[GridFrequency<E::Scenario>]) -> bool {
         let known = self.locations.len();
         for location in locations {
             if !self.locations.iter().any(|other| other.is_near(location)) {

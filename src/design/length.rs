@@ -5,9 +5,9 @@ use super::deviations::Deviations;
 use super::figure_band::FigureBand;
 use super::fir_errors::{BankSize, FirErrors, candidates};
 use super::methods::robust_fir::robust_box;
-use super::methods::{self, Settings};
+use super::methods::{self, MethodSettings};
 use super::plant::LiftedPlant;
-use super::preparation::{Comparison, merged, settings, with_usual_noise};
+use super::preparation::{SizingControl, merged, settings, with_usual_noise};
 use super::problem::{Problem, common_delay};
 use super::tones::ToneResponse;
 use crate::bank::SynthesisFilters;
@@ -97,7 +97,7 @@ impl<'a> Lengths<'a> {
     ///
     /// # Errors
     /// [`DesignError::FigureOutOfReach`], [`DesignError::FigureMissed`], [`DesignError::Stopped`].
-    pub(super) fn fewest(&self, goal: Goal, comparison: Comparison<'_>) -> Result<BankSize, DesignError> {
+    pub(super) fn fewest(&self, goal: Goal, comparison: SizingControl<'_>) -> Result<BankSize, DesignError> {
         let size = self.fewest_of_least_squares(goal)?;
         let is_minimax = self.spec.design.method == Method::Fir && robust_box(self.spec).is_none();
         match goal {
@@ -147,7 +147,7 @@ impl<'a> Lengths<'a> {
         BankSize { mut taps, mut latency }: BankSize,
         figure: TargetFigure,
         wanted: f64,
-        comparison: Comparison<'_>,
+        comparison: SizingControl<'_>,
     ) -> Result<BankSize, DesignError> {
         let most = MAX_OPTIMISED_TAPS / self.spec.layout().count();
         let mut best = f64::NEG_INFINITY;
@@ -157,7 +157,7 @@ impl<'a> Lengths<'a> {
                 latency = self.best(taps).latency;
             }
             comparison.after(designs)?;
-            let settings = Settings { stop: comparison.stop.clone(), ..settings(self.spec, taps)? };
+            let settings = MethodSettings { stop: comparison.stop.clone(), ..settings(self.spec, taps)? };
             let plant = LiftedPlant::new(&Problem { latency, ..self.problem.clone() });
             let synthesis = methods::synthesise(Method::Fir, &plant, &settings)?;
             comparison.go_on()?;

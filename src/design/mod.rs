@@ -40,7 +40,7 @@ pub use analysis::{
     Analysis, GammaScale, MeanAnalysis, analyze, analyze_mean, delay_point, noise_gain, norm_at,
 };
 pub(crate) use analysis::{NearestSample, nearest_samples};
-pub use designer::{Design, Options, ProofSearch, design, judge_taps};
+pub use designer::{Design, DesignOptions, ProofSearch, design, judge_taps};
 pub(crate) use deviations::Deviations;
 pub use error::DesignError;
 pub use figure_band::{BandSource, FigureBand};
@@ -54,7 +54,7 @@ pub use problem::Problem;
 pub use prove::certify;
 pub use reduction::{OrderErrorPoint, OrderReduction};
 pub use responses::error_response;
-pub(crate) use signal::{Columns, SampledSignal};
+pub(crate) use signal::{AliasColumns, SampledSignal};
 pub use sizing::Sizing;
 pub use tones::ToneOutput;
 pub(crate) use tones::{ToneResponse, Worst};

@@ -50,7 +50,7 @@ pub(super) fn realise(
     stop: &Stop,
 ) -> Result<Realised, DesignError> {
     let whole = if merged.are_unchanged() { merged_plant.clone() } else { LiftedPlant::new(problem) };
-    let realisation = Realisation { spec, problem, whole: &whole, merged, stop };
+    let realisation = FilterRealisation { spec, problem, whole: &whole, merged, stop };
     let realised = match &synthesis.filters {
         SynthesisFilters::Fir(taps) => realisation.with_integers(realisation.fir(taps, synthesis.peak)?),
         recursion => realisation.state_space(&filters::lifted(recursion, spec.ratio), synthesis.peak.gain),
@@ -60,7 +60,7 @@ pub(super) fn realise(
     Ok(Realised { norm_error, ..realised })
 }
 
-struct Realisation<'a> {
+struct FilterRealisation<'a> {
     spec: &'a Spec,
     /// All channels.
     problem: &'a Problem,
@@ -71,7 +71,7 @@ struct Realisation<'a> {
     stop: &'a Stop,
 }
 
-impl Realisation<'_> {
+impl FilterRealisation<'_> {
     fn fir(&self, taps: &[Vec<f64>], peak: Peak) -> Result<Realised, DesignError> {
         if self.merged.are_unchanged() {
             return Ok(Realised::of(SynthesisFilters::Fir(taps.to_vec()), peak));

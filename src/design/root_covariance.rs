@@ -16,7 +16,7 @@
 
 use super::deviations::Deviations;
 use super::problem::Problem;
-use super::quadrature::{Integrand, Node};
+use super::quadrature::{Integrand, QuadratureNode};
 use super::signal::SampledSignal;
 use crate::linalg::{self, CMat, Complex, Mat};
 use std::ops::RangeInclusive;
@@ -117,7 +117,7 @@ pub(super) struct PartialHistory<'a> {
 
 /// An estimate from known samples.
 #[derive(Debug)]
-pub(super) struct Estimate {
+pub(super) struct LinearEstimate {
     /// The weights of the known samples.
     pub(super) weights: Vec<f64>,
     /// The mean square of its error.
@@ -126,13 +126,16 @@ pub(super) struct Estimate {
 
 impl PartialHistory<'_> {
     /// The estimate of a sample of the history.
-    pub(super) fn sample(&self, place: usize) -> Estimate {
+    pub(super) fn sample(&self, place: usize) -> LinearEstimate {
         let own = self.whole.samples.row(place);
         let projection = own * self.basis.transpose();
         let error = (own - &projection * &self.basis).norm_squared();
         // Every sample has noise, so none of the known ones follows from the others.
         let weights = self.samples.tr_solve_lower_triangular(&projection.transpose());
-        Estimate { weights: weights.map_or_else(Vec::new, |weights| weights.as_slice().to_vec()), error }
+        LinearEstimate {
+            weights: weights.map_or_else(Vec::new, |weights| weights.as_slice().to_vec()),
+            error,
+        }
     }
 
     /// The error of the estimate of the target at `instant`.
@@ -149,7 +152,7 @@ fn integrand(
     signal: &SampledSignal,
     frames: usize,
     instants: &RangeInclusive<i64>,
-) -> Vec<Node> {
+) -> Vec<QuadratureNode> {
     let ratio = problem.ratio as f64;
     let oldest = -problem.longest_delay().0 - frames as f64 * ratio;
     let reach = (*instants.end() as f64).max(0.0) - oldest.min(*instants.start() as f64);
@@ -185,7 +188,7 @@ impl RootColumns {
 
     /// Adds what the signal gives at a node. An LQ factorisation leaves the samples no more columns than
     /// channels.
-    fn add(&mut self, signal: &SampledSignal, deviations: &[Deviations], node: Node) {
+    fn add(&mut self, signal: &SampledSignal, deviations: &[Deviations], node: QuadratureNode) {
         let columns = signal.at(node.theta).with_errors(signal.problem(), deviations);
         let channels = self.sizes.len();
         let stacked =

@@ -50,7 +50,7 @@ struct Alias {
 /// The mean over theta of `|reference - F measurement|^2 / M` (Frobenius) is the mean square of the error of
 /// the filters F per fast sample.
 #[derive(Debug, Clone)]
-pub(crate) struct Columns {
+pub(crate) struct AliasColumns {
     /// w of each column, radians per fast period.
     pub(crate) frequencies: Vec<f64>,
     /// N rows.
@@ -101,7 +101,7 @@ impl SampledSignal {
     }
 
     /// The columns at theta, radians per slow period.
-    pub(crate) fn at(&self, theta: f64) -> Columns {
+    pub(crate) fn at(&self, theta: f64) -> AliasColumns {
         let Problem { ratio, latency, front_ends, target, channels, .. } = &self.problem;
         let filters = 0..front_ends.len();
         let period = *ratio as f64;
@@ -126,11 +126,11 @@ impl SampledSignal {
                 reference[(p, k)] = passed[*target] * Complex::from_polar(1.0, advance);
             }
         }
-        Columns { frequencies, measurement, reference }
+        AliasColumns { frequencies, measurement, reference }
     }
 }
 
-impl Columns {
+impl AliasColumns {
     /// The mean over errors of the converters, and beside it columns that the samples of one converter alone
     /// have: the mean square over all columns is that over the errors. A delay shared by the samples of a
     /// converter changes nothing between them.

@@ -3,10 +3,10 @@
 //!
 //! # Tones
 //! A tone at the analog frequency w gives the samples `g_i Phi_i(j w) e^{-j w D_i} e^{j w k M}` (h = 1), and
-//! the bank answers with tones at w + 2 pi k / M ([`ToneOutput`]). The one for k = 0 against the target's is the
-//! error of gain and phase; the others are images. The largest image over a band predicts the spurious-free
-//! dynamic range. Delays and gains within the spec's `[uncertainty]` count as the mean over Gaussian errors
-//! whose 95 % intervals are the stated ones, constant for each converter.
+//! the bank answers with tones at w + 2 pi k / M ([`ToneOutput`]). The one for k = 0 against the target's
+//! is the error of gain and phase; the others are images. The largest image over a band predicts the
+//! spurious-free dynamic range. Delays and gains within the spec's `[uncertainty]` count as the mean over
+//! Gaussian errors whose 95 % intervals are the stated ones, constant for each converter.
 //!
 //! # Signal-to-noise ratio
 //! Variance of the target over the variance of the error, averaged over time, in decibels. For white noise

@@ -7,7 +7,7 @@ use super::snr::Ratios;
 use super::*;
 use crate::bank::SynthesisFilters;
 use crate::design::filters::FilterResponse;
-use crate::design::{Options, SampledSignal, analyze_mean, design, filters};
+use crate::design::{DesignOptions, SampledSignal, analyze_mean, design, filters};
 use crate::linalg::{self, Mat};
 use crate::random::Random;
 use crate::simulate::{Analog, Source, Tone as SourceTone, capture};
@@ -43,7 +43,7 @@ impl System {
     }
 
     fn bank(&self, design: &str) -> Bank {
-        crate::design::design(&self.spec(design), &Options::without_proof()).unwrap().bank
+        crate::design::design(&self.spec(design), &DesignOptions::without_proof()).unwrap().bank
     }
 }
 
@@ -329,7 +329,8 @@ fn check_prediction(seed: u64) {
         let delay = ratio as f64 * (i as f64 + 0.6 * random.part()) / channels as f64;
         let _ = write!(text, "[[channel]]\ndelay = {delay}\ngain = {}\n", 1.0 + 0.1 * random.sample());
     }
-    let bank = design(&Spec::from_toml(&text, "spec.toml").unwrap(), &Options::without_proof()).unwrap().bank;
+    let bank =
+        design(&Spec::from_toml(&text, "spec.toml").unwrap(), &DesignOptions::without_proof()).unwrap().bank;
     let figures = Figures::new(&bank).unwrap();
     let SynthesisFilters::Fir(taps) = &bank.filters else { panic!("FIR") };
     let plain = without_signal(bank.spec.as_ref().unwrap(), bank.latency).unwrap();

@@ -1,11 +1,11 @@
 //! The figures of a record with tones.
 
-use super::expected::{Expected, Pattern};
-use super::lines::{Found, Lines, fit_lines};
+use super::expected::{Expected, ExpectedLines};
+use super::lines::{FoundLine, Lines, fit_lines};
 use super::record::{Quadrature, RecordParts, UnsettledEnds};
-use super::{Cause, MeasureError, Settings, Spectrum, Window};
+use super::{Cause, MeasureError, RecordSpectrum, Settings, Window};
 use crate::sine_fit::SineFitError::{AtEdge, NoTone, TonesCoincide};
-use crate::sine_fit::{Direction, Estimate, SineFit, ToneFit, find_tones, fit, locate, with_lines};
+use crate::sine_fit::{Estimate, RotationSense, SineFit, ToneFit, find_tones, fit, locate, with_lines};
 use crate::units::{Decibels, Hertz, Radians};
 
 /// A tone that is given may be this far from the true one, in cycles per sample ..
@@ -77,7 +77,7 @@ pub struct Measurement {
     pub unsettled_ends: Option<UnsettledEnds>,
     /// The spectrum of the record without its constant.
     #[serde(skip)]
-    pub spectrum: Spectrum,
+    pub spectrum: RecordSpectrum,
 }
 
 impl Measurement {
@@ -171,7 +171,7 @@ fn measured(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Resul
 fn figures(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
     let tones = fit_tones(record, rate, settings)?;
     let cycles: Vec<f64> = tones.frequencies.iter().map(|f| f.value / rate).collect();
-    let pattern = Pattern {
+    let pattern = ExpectedLines {
         tones: &cycles,
         is_complex: record.is_complex(),
         converters: settings.converters,
@@ -181,7 +181,7 @@ fn figures(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Result
     let expected = Expected::of(&pattern);
     let lines = fit_lines(record, &tones, &expected, &pattern)?;
     let rest = spectrum(&lines.rest, rate, settings.window);
-    Ok(Figures { record, pattern: &pattern, tones: &tones, lines: &lines, rest, settings }
+    Ok(FigureSources { record, pattern: &pattern, tones: &tones, lines: &lines, rest, settings }
         .assemble(expected.hidden))
 }
 
@@ -193,7 +193,7 @@ fn fit_tones(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Resu
         .map_err(|error| with_lines(error, &channels, rate))?;
     let size = |direction| record.amplitude(&found, 0, direction);
     let is_given = !settings.tones.is_empty() || !record.is_complex();
-    if is_given || size(Direction::Forward) >= size(Direction::Backward) {
+    if is_given || size(RotationSense::Forward) >= size(RotationSense::Backward) {
         return Ok(found);
     }
     Ok(fit(&channels, rate, &[-found.frequencies[0].value])?)
@@ -210,25 +210,25 @@ fn starts(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Result<
     settings.tones.iter().map(start).collect()
 }
 
-fn spectrum(record: &RecordParts<'_>, rate: Hertz, window: Window) -> Spectrum {
+fn spectrum(record: &RecordParts<'_>, rate: Hertz, window: Window) -> RecordSpectrum {
     match record.parts() {
-        [real, imaginary] => Spectrum::complex(real, imaginary, rate, window),
-        parts => Spectrum::new(&parts[0], rate, window),
+        [real, imaginary] => RecordSpectrum::complex(real, imaginary, rate, window),
+        parts => RecordSpectrum::new(&parts[0], rate, window),
     }
 }
 
 /// What the figures are computed from.
-struct Figures<'a> {
+struct FigureSources<'a> {
     record: &'a RecordParts<'a>,
-    pattern: &'a Pattern<'a>,
+    pattern: &'a ExpectedLines<'a>,
     tones: &'a SineFit,
     lines: &'a Lines,
     /// The spectrum of what is left without lines.
-    rest: Spectrum,
+    rest: RecordSpectrum,
     settings: &'a Settings,
 }
 
-impl Figures<'_> {
+impl FigureSources<'_> {
     fn assemble(&self, hidden: Vec<Cause>) -> Measurement {
         let Settings { converters, harmonics, full_scale, rails, window, .. } = *self.settings;
         let own = &self.tones.channels[0];
@@ -278,7 +278,7 @@ impl Figures<'_> {
 
     /// The tone k: the sine, or the exponential of a complex record.
     fn tone(&self, k: usize) -> ToneFit {
-        self.tones.phasor(self.record.wave(Direction::Forward), k)
+        self.tones.phasor(self.record.wave(RotationSense::Forward), k)
     }
 
     fn amplitudes(&self) -> impl Iterator<Item = f64> {
@@ -289,7 +289,7 @@ impl Figures<'_> {
     fn other_power(&self) -> f64 {
         let parts = self.tones.channels.iter().map(|part| part.residual_rms.powi(2));
         let rest = parts.sum::<f64>() / self.tones.channels.len() as f64;
-        let image = |k| 0.5 * self.record.amplitude(self.tones, k, Direction::Backward).powi(2);
+        let image = |k| 0.5 * self.record.amplitude(self.tones, k, RotationSense::Backward).powi(2);
         let images = (0..self.tones.tones()).filter(|_| self.record.is_complex()).map(image);
         rest + images.sum::<f64>()
     }
@@ -319,7 +319,7 @@ impl Figures<'_> {
     }
 
     /// The largest tone over the largest line that counts, or the largest bin of the rest.
-    fn sfdr(&self, counts: impl Fn(&Found) -> bool) -> Decibels {
+    fn sfdr(&self, counts: impl Fn(&FoundLine) -> bool) -> Decibels {
         let floor = self.rest.largest();
         let counted = self.lines.found.iter().filter(|line| counts(line));
         let largest = counted.fold(floor, |most, line| most.max(line.amplitude));
@@ -336,7 +336,7 @@ impl Figures<'_> {
 
     fn spurs(&self) -> Vec<Spur> {
         let largest = self.largest_tone();
-        let spur = |line: &Found| Spur {
+        let spur = |line: &FoundLine| Spur {
             frequency: line.frequency,
             amplitude: line.amplitude,
             level: Decibels::of_amplitude(line.amplitude / largest),

@@ -8,7 +8,7 @@
 
 use super::ball::{self, Matrix};
 use super::front_ends::FrontEnds;
-use super::state_transition::{StateTransition, state_transition};
+use super::state_transition::{EnclosedTransition, state_transition};
 use super::timeline::{SamplingInstant, between, delay_periods};
 use crate::arithmetic::{DoubleDouble, Number};
 use crate::units::{GridTime, Timeline};
@@ -33,7 +33,7 @@ impl<F: Number> SlowPeriod<F> {
         let (a, b) = front_ends.dynamics();
         let instants = timeline.instants();
         let from_start = |&time| state_transition(&a, &b, between(timeline.start(), time));
-        let since_start: Vec<StateTransition<F>> = instants.iter().map(from_start).collect();
+        let since_start: Vec<EnclosedTransition<F>> = instants.iter().map(from_start).collect();
         let rows: Vec<Matrix<F>> = samples.iter().map(|sample| front_ends.output(sample)).collect();
         let n = front_ends.order();
         let mut outputs = ball::zeros(samples.len(), n);
@@ -67,7 +67,7 @@ impl<F: Number> SlowPeriod<F> {
 fn correlate<F: Number>(
     gram: &mut Matrix<F>,
     timeline: &Timeline,
-    since_start: &[StateTransition<F>],
+    since_start: &[EnclosedTransition<F>],
     between: &[Matrix<F>],
     rows: &[Matrix<F>],
 ) {

@@ -166,7 +166,7 @@ fn gram_matrices_are_positive_and_tight() {
 fn designed(method: Method, latency: usize, taps: usize) -> (Bank, Verified) {
     let mut spec = alike(&thesis_filter(), &[1.2, 0.6], 2, latency, 1).spec.unwrap();
     spec.design = DesignSpec::new(method, method.has_taps().then_some(taps));
-    let design = crate::design::design(&spec, &crate::design::Options::default()).unwrap();
+    let design = crate::design::design(&spec, &crate::design::DesignOptions::default()).unwrap();
     (design.bank, design.proof.unwrap())
 }
 
@@ -227,7 +227,7 @@ fn a_corrected_certificate_passes_and_proves_no_less_than_the_norm() {
     let steep = family(Family::Butterworth, 8, 0.1 * TAU);
     let mut spec = bank(steep.clone(), vec![steep], &[0.6], 2, 1, 1).spec.unwrap();
     spec.design = DesignSpec::new(Method::Iir, None);
-    let design = crate::design::design(&spec, &crate::design::Options::default()).unwrap();
+    let design = crate::design::design(&spec, &crate::design::DesignOptions::default()).unwrap();
     let proven = design.proof.unwrap();
     assert!(proven.upper - proven.attained <= 1e-4 * proven.upper, "{proven:?}");
     let certificate = design.bank.proof.as_ref().unwrap().upper.clone();

@@ -8,7 +8,7 @@ use hybank::spec::Spec;
 
 /// Designs without a search for proofs, which other tests are about.
 fn design(spec: &Spec) -> Result<Design, DesignError> {
-    hybank::design::design(spec, &hybank::design::Options::without_proof())
+    hybank::design::design(spec, &hybank::design::DesignOptions::without_proof())
 }
 
 fn spec(method: &str, delays: &[f64], latency: usize, target: &str) -> Spec {

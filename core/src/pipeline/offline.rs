@@ -27,7 +27,7 @@ const MULTIPLY_ADDS_PER_STORE: usize = 8;
 /// with the signal.
 ///
 /// `parts` is one input of real samples, or the real and the imaginary parts of complex ones; then
-/// [`Output::select`](crate::runtime::Output::select) says which of them `output` stores. `stop` is called
+/// [`Output::select`](crate::runtime::OutputFrames::select) says which of them `output` stores. `stop` is called
 /// every few milliseconds of work, on the thread of the caller, and ends the fusion if it returns true.
 ///
 /// # Errors

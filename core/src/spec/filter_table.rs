@@ -6,8 +6,8 @@ use super::error::refused;
 use super::table::Table;
 use super::tables::{Pair, required};
 use super::{
-    Family, FilterModel, FilterModels, FilterSpec, MeasuredFilter, Measurement, OneOrEach, Passband, Refusal,
-    SpecError, SpecProblem,
+    Family, FilterModel, FilterModels, FilterSpec, MeasuredFilter, MeasurementFile, OneOrEach, Passband,
+    Refusal, SpecError, SpecProblem,
 };
 use crate::quantity::Time;
 use crate::units::{Decibels, Hertz, Seconds};
@@ -177,8 +177,8 @@ impl FilterTable {
         Ok(MeasuredFilter {
             path: required(path, "touchstone", "name the file of the measurement")?,
             measurement: match is_touchstone {
-                true => Measurement::Touchstone(self.parameter),
-                false => Measurement::Response,
+                true => MeasurementFile::Touchstone(self.parameter),
+                false => MeasurementFile::Response,
             },
             order: required(self.order, "order", "give the number of poles of the model")?,
             deembed: self.deembed.map_or(Seconds(0.0), |delay| delay.in_seconds(h)),

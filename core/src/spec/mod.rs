@@ -31,7 +31,8 @@ pub use error::{Refusal, SpecError, SpecProblem};
 pub use error_box::{ConverterErrors, ErrorBox, ErrorPoint};
 pub(crate) use filter::no_models;
 pub use filter::{
-    Family, FilterModel, FilterModels, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB, MeasuredFilter, Measurement,
+    Family, FilterModel, FilterModels, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB, MeasuredFilter,
+    MeasurementFile,
 };
 pub use filter_rules::MAX_ORDER;
 pub use fitting::{Cutoff, Fitting, UnknownFitting};

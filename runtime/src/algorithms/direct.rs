@@ -10,12 +10,12 @@
 #[cfg(test)]
 mod tests;
 
-use super::filter::{Facts, Filter, check_finite, phase_taps};
+use super::filter::{AlgorithmFacts, Filter, check_finite, phase_taps};
 use crate::adapters::{InputFrames, OutputFrames};
 use crate::aligned::Aligned;
 use crate::history::History;
 use crate::simd::{FirKernel, Polyphase, Replaced, Segment, Tiling, not_finite, replace_not_finite};
-use crate::state::{Count, Numbers};
+use crate::state::{Count, StateNumbers};
 use crate::{BuildError, Isa, Sample};
 use std::ops::Range;
 
@@ -234,8 +234,8 @@ impl<T: Sample> Direct<T> {
 impl<T: Sample> Filter for Direct<T> {
     type State = DirectState<T>;
 
-    fn facts(&self) -> Facts {
-        Facts {
+    fn facts(&self) -> AlgorithmFacts {
+        AlgorithmFacts {
             name: "direct",
             history: Some(self.history),
             delay: 0,
@@ -286,7 +286,7 @@ impl<T: Sample> Filter for Direct<T> {
         state.history.save(self.history, put);
     }
 
-    fn resume(&self, state: &mut DirectState<T>, _place: usize, numbers: Numbers<'_>) {
+    fn resume(&self, state: &mut DirectState<T>, _place: usize, numbers: StateNumbers<'_>) {
         state.history.resume(self.history, numbers);
     }
 }

@@ -4,7 +4,7 @@
 //! group, each lane for itself: frames of several channels are transformed as they lie, and every lane has
 //! the bits that it would have alone. Nothing is fused, so these are the same on every processor.
 
-use super::dispatch::Element;
+use super::dispatch::SimdElement;
 use super::portable::Portable;
 use super::vector::Number;
 use crate::Sample;
@@ -15,7 +15,7 @@ use std::array;
 use std::ops::{Add, Div, Mul, Neg, Rem, Sub};
 
 /// One frequency, or one frame of each block, of several channels or phases.
-pub(crate) type Row<T> = Complex<<T as Element>::Portable>;
+pub(crate) type Row<T> = Complex<<T as SimdElement>::Portable>;
 
 /// A lane group that is a number of rustfft.
 pub(crate) trait Lanes<T>: FftNum {

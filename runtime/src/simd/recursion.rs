@@ -22,12 +22,12 @@ const STEP: usize = 4;
 pub(crate) struct Recursion {
     /// S, states after padding to whole vectors.
     pub(crate) states: usize,
-    pub(crate) form: Form,
+    pub(crate) form: RecursionForm,
 }
 
 /// How the states depend on one another.
 #[derive(Debug)]
-pub(crate) enum Form {
+pub(crate) enum RecursionForm {
     /// By twos: states 2 v L + l and 2 v L + L + l, L lanes per vector, belong to section v L + l.
     Sections(Vec<SectionVector>),
     /// In any way.
@@ -113,7 +113,7 @@ impl RecursionKernel {
     }
 }
 
-impl Form {
+impl RecursionForm {
     /// Coefficients, one multiply-add per frame each.
     #[cfg(test)]
     fn coefficients(&self) -> usize {
@@ -156,7 +156,7 @@ impl Kernel for Body {
     #[inline(always)]
     unsafe fn run<V: Vector<Sample = f64>>(job: &Job<'_>) {
         match &job.recursion.form {
-            Form::Sections(vectors) => {
+            RecursionForm::Sections(vectors) => {
                 let whole = job.frames / STEP * STEP;
                 for t in (0..whole).step_by(STEP) {
                     sections::<V, STEP>(job, vectors, t);
@@ -165,7 +165,7 @@ impl Kernel for Body {
                     sections::<V, 1>(job, vectors, t);
                 }
             }
-            Form::Dense(tiles) => {
+            RecursionForm::Dense(tiles) => {
                 for t in 0..job.frames {
                     dense::<V>(job, tiles, t);
                 }

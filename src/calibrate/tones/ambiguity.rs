@@ -1,8 +1,8 @@
 //! What the phases of tones leave open: the Nyquist zone of a tone, and whole periods of a delay.
 
-use super::phasors::Measured;
+use super::phasors::TonePhasors;
 use crate::calibrate::error::CalibrateError;
-use crate::calibrate::model::Model;
+use crate::calibrate::model::ChannelModel;
 use crate::sine_fit::wrapped;
 use crate::units::FastPeriods;
 use std::f64::consts::TAU;
@@ -58,7 +58,7 @@ impl ObservedTone {
 
 impl AliasCandidate {
     /// How far measured phases are from the nominal ones (radians, rms).
-    fn distance(self, model: &Model, phases: &[f64], reference: usize) -> f64 {
+    fn distance(self, model: &ChannelModel, phases: &[f64], reference: usize) -> f64 {
         let w = TAU * self.cycles / model.ratio as f64;
         let off = |i: usize| {
             let measured = phases[i] - phases[reference];
@@ -73,7 +73,7 @@ impl AliasCandidate {
 /// The frequency, in cycles per slow sample, of a tone that appears at `alias` with `phases`: the one in the
 /// signal's zone of the fast rate whose nominal phases agree.
 pub(super) fn zone_of(
-    model: &Model,
+    model: &ChannelModel,
     alias: ObservedTone,
     phases: &[f64],
     reference: usize,
@@ -95,12 +95,12 @@ pub(super) fn zone_of(
 }
 
 /// The tone of the highest frequency.
-fn highest<'a>(tones: &[&'a Measured]) -> Option<&'a Measured> {
+fn highest<'a>(tones: &[&'a TonePhasors]) -> Option<&'a TonePhasors> {
     tones.iter().copied().max_by(|a, b| a.w.total_cmp(&b.w))
 }
 
 /// The least change of a delay that leaves all phases as they are.
-pub(super) fn modulus(tones: &[&Measured]) -> Option<FastPeriods> {
+pub(super) fn modulus(tones: &[&TonePhasors]) -> Option<FastPeriods> {
     let period = TAU / highest(tones)?.w;
     let agrees = |shift: &f64| tones.iter().all(|tone| wrapped(tone.w * shift).abs() < SAME_PHASE);
     (1..=MOST_PERIODS).map(|m| m as f64 * period).find(agrees).map(FastPeriods)
@@ -108,7 +108,7 @@ pub(super) fn modulus(tones: &[&Measured]) -> Option<FastPeriods> {
 
 /// The deviation of the delay of channel `i` from nominal, roughly: among those within `reach` fast periods
 /// the one nearest to 0 that agrees with the phases of all tones about as well as the best.
-pub(super) fn nearest_delay(tones: &[&Measured], i: usize, reach: f64) -> f64 {
+pub(super) fn nearest_delay(tones: &[&TonePhasors], i: usize, reach: f64) -> f64 {
     let Some(top) = highest(tones) else { return 0.0 };
     let (first, period) = (-top.ratios[i].arg() / top.w, TAU / top.w);
     let most = if tones.len() == 1 { 0 } else { ((reach / period) as i64).min(MOST_PERIODS as i64) };

@@ -19,13 +19,13 @@ struct Geometric {
 impl AffineError for Geometric {
     type Scenario = ();
 
-    fn at(&self, location: &Location<()>) -> FrequencyPoint {
+    fn at(&self, location: &GridFrequency<()>) -> FrequencyPoint {
         self.point(location.frequency)
     }
 
     fn peaks(&self, taps: &Taps, _level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
         let gain = |k: usize| {
-            let location = Location { frequency: PI * k as f64 / self.grid as f64, scenario: () };
+            let location = GridFrequency { frequency: PI * k as f64 / self.grid as f64, scenario: () };
             LocatedPeak { gain: gain(&self.point(location.frequency), taps), location }
         };
         Ok((0..=self.grid).map(gain).max_by(|a, b| a.gain.total_cmp(&b.gain)).into_iter().collect())
@@ -162,7 +162,7 @@ fn a_wider_margin_lowers_the_mean_square_within_the_cap() {
 #[test]
 fn known_frequencies_are_not_added_twice() {
     let mut exchange = exchange(geometric(0.5, 1.0, &[1.0]), 1, 0.0);
-    let at = |frequency: f64| Location { frequency, scenario: () };
+    let at = |frequency: f64| GridFrequency { frequency, scenario: () };
     assert!(!exchange.add(&[at(0.0), at(PI + 1e-9)]));
     assert!(exchange.add(&[at(1.0), at(1.0)]));
     assert_eq!(exchange.locations.len(), 6);

@@ -34,7 +34,7 @@ const WORTHWHILE_REDUCTION: f64 = 0.9;
 
 /// Filters with the norm of their error system.
 #[derive(Debug, Clone)]
-pub(super) struct Evaluated {
+pub(super) struct EvaluatedFilters {
     filters: Filter,
     pub(super) peak: Peak,
 }
@@ -49,7 +49,7 @@ pub(super) struct GammaIteration<'a> {
     feedthrough: f64,
     /// No causal filter achieves less.
     lower: f64,
-    best: Option<Evaluated>,
+    best: Option<EvaluatedFilters>,
     /// Riccati equations solved.
     trials: usize,
     /// Ends the search between two trials, with the best filters so far.
@@ -105,11 +105,11 @@ impl<'a> GammaIteration<'a> {
 
     /// The filters with their norm; `None` if rounding errors made the filters unstable or are as large as
     /// the norm.
-    pub(super) fn evaluate(&self, filters: Filter) -> Result<Option<Evaluated>, DesignError> {
+    pub(super) fn evaluate(&self, filters: Filter) -> Result<Option<EvaluatedFilters>, DesignError> {
         let norm = self.plant.norm(&filters);
         match norm.and_then(|peak| Ok((self.plant.rounding(&filters)? < peak.gain, peak))) {
             Ok((is_known, peak)) if is_known || self.is_negligible(peak.gain) => {
-                Ok(Some(Evaluated { filters, peak }))
+                Ok(Some(EvaluatedFilters { filters, peak }))
             }
             Ok(_) => Ok(None),
             Err(DesignError::Lti(LtiError::Unstable { .. } | LtiError::IterationLimit { .. })) => Ok(None),
@@ -117,7 +117,7 @@ impl<'a> GammaIteration<'a> {
         }
     }
 
-    fn keep(&mut self, found: Evaluated) {
+    fn keep(&mut self, found: EvaluatedFilters) {
         if self.best.as_ref().is_none_or(|best| found.peak.gain < best.peak.gain) {
             self.best = Some(found);
         }
@@ -261,7 +261,7 @@ impl<'a> GammaIteration<'a> {
     ///
     /// # Errors
     /// [`DesignError::RiccatiFailed`] if there are none.
-    pub(super) fn best(&self) -> Result<Evaluated, DesignError> {
+    pub(super) fn best(&self) -> Result<EvaluatedFilters, DesignError> {
         match &self.best {
             Some(best) => Ok(best.clone()),
             None => Err(self.failed(Some(self.zero_output_norm()?))),
@@ -274,8 +274,8 @@ impl<'a> GammaIteration<'a> {
     }
 
     /// `chosen` with the bounds that were found.
-    pub(super) fn synthesis(&self, chosen: Evaluated) -> Synthesis {
-        let Evaluated { filters, peak } = chosen;
+    pub(super) fn synthesis(&self, chosen: EvaluatedFilters) -> Synthesis {
+        let EvaluatedFilters { filters, peak } = chosen;
         Synthesis {
             filters: SynthesisFilters::StateSpace(to_block(&filters)),
             peak,

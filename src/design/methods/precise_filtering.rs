@@ -58,7 +58,7 @@ pub(super) struct PreciseFiltering<F> {
 }
 
 /// One step of the difference equation.
-struct Step<F> {
+struct RiccatiStep<F> {
     /// P+.
     next: Matrix<F>,
     /// Re.
@@ -116,7 +116,7 @@ impl<F: Number> PreciseFiltering<F> {
         for _ in 0..self.start {
             p = self.step(&p, gamma)?.next;
         }
-        let Step { next, innovation, cross } = self.step(&p, gamma)?;
+        let RiccatiStep { next, innovation, cross } = self.step(&p, gamma)?;
         let c = self.rows(self.outputs(gamma));
         let weighted = solve(&innovation, &c)?;
         let f = self.rows(self.states()) - product(&cross.transpose(), &weighted);
@@ -130,7 +130,7 @@ impl<F: Number> PreciseFiltering<F> {
     }
 
     /// The step from `p`. A measurement that is zero so far adds nothing.
-    fn step(&self, p: &Matrix<F>, gamma: Option<f64>) -> Option<Step<F>> {
+    fn step(&self, p: &Matrix<F>, gamma: Option<f64>) -> Option<RiccatiStep<F>> {
         let mut gram = self.gram(p);
         let square = F::from(gamma.unwrap_or(0.0)) * F::from(gamma.unwrap_or(0.0));
         self.references().for_each(|i| gram[(i, i)] -= square);
@@ -138,7 +138,7 @@ impl<F: Number> PreciseFiltering<F> {
         let active: Vec<usize> = outputs.iter().copied().filter(|&i| gram[(i, i)] != F::ZERO).collect();
         let seen = select(&gram, &active, &states);
         let explained = product(&seen.transpose(), &solve(&select(&gram, &active, &active), &seen)?);
-        Some(Step {
+        Some(RiccatiStep {
             next: symmetric(&(select(&gram, &states, &states) - explained)),
             innovation: select(&gram, &outputs, &outputs),
             cross: select(&gram, &outputs, &states),
@@ -149,7 +149,7 @@ impl<F: Number> PreciseFiltering<F> {
     /// achieves gamma: positive for the measurements, negative for the references given these. `None` if
     /// digits were lost on the way, so that the signs say nothing.
     fn is_right(&self, covariance: &Matrix<F>, gamma: f64) -> Option<bool> {
-        let Step { next, innovation, .. } = self.step(covariance, Some(gamma))?;
+        let RiccatiStep { next, innovation, .. } = self.step(covariance, Some(gamma))?;
         let change = |i: usize| (next[(i, i)] - covariance[(i, i)]).nearest().abs();
         let size = |i: usize| {
             covariance[(i, i)].nearest().abs() + ZERO_COVARIANCE * self.input_gram[(i, i)].nearest()

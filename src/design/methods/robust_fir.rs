@@ -6,10 +6,10 @@
 //! [`crate::design::uncertainty::search`] finds them, and its dual stays a lower bound for all banks of that
 //! length over the box.
 
-use super::{Settings, Synthesis, fir, tap_lags};
+use super::{MethodSettings, Synthesis, fir, tap_lags};
 use crate::bank::SynthesisFilters;
 use crate::design::DesignError;
-use crate::design::error_grid::{AffineError, ErrorGrid, LocatedPeak, Location};
+use crate::design::error_grid::{AffineError, ErrorGrid, GridFrequency, LocatedPeak};
 use crate::design::exchange::{Exchange, Tolerances};
 use crate::design::filters::{FilterResponse, impulse_responses};
 use crate::design::plant::LiftedPlant;
@@ -57,7 +57,7 @@ impl RobustStudy {
 /// As [`fir::synthesise`].
 pub(crate) fn synthesise(
     plant: &LiftedPlant,
-    settings: &Settings,
+    settings: &MethodSettings,
     errors: &ErrorBox,
 ) -> Result<Synthesis, DesignError> {
     let nominal = fir::synthesise(plant, settings)?;
@@ -102,7 +102,7 @@ fn study_of(nominal: &Synthesis, search: &BoxSearch) -> Result<RobustStudy, Desi
 fn least_worst_norm(
     plant: &LiftedPlant,
     search: BoxSearch,
-    settings: &Settings,
+    settings: &MethodSettings,
     study: RobustStudy,
 ) -> Result<(RobustStudy, Synthesis), DesignError> {
     let mut exchange = exchange(plant, search, settings)?;
@@ -117,7 +117,7 @@ fn least_worst_norm(
             break (taps, worst.peak.gain);
         }
         let scenario = exchange.error.search.include(&worst.point);
-        if !exchange.add(&[Location { frequency: worst.peak.frequency, scenario }]) {
+        if !exchange.add(&[GridFrequency { frequency: worst.peak.frequency, scenario }]) {
             break (taps, worst.peak.gain);
         }
     };
@@ -146,7 +146,7 @@ struct BoxError {
 impl AffineError for BoxError {
     type Scenario = Combination;
 
-    fn at(&self, location: &Location<Combination>) -> FrequencyPoint {
+    fn at(&self, location: &GridFrequency<Combination>) -> FrequencyPoint {
         let response = self.search.plant().response(location.frequency);
         let h = self.search.plant().measurements(&response, &location.scenario);
         let count = h.nrows();
@@ -165,7 +165,7 @@ impl AffineError for BoxError {
 fn exchange(
     plant: &LiftedPlant,
     search: BoxSearch,
-    settings: &Settings,
+    settings: &MethodSettings,
 ) -> Result<Exchange<BoxError>, DesignError> {
     let lags = tap_lags(plant.ratio(), settings.taps);
     let (points, weights) = ErrorGrid::new(plant, lags[0])?.coarse();

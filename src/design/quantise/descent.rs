@@ -1,6 +1,6 @@
 //! Descent on gamma itself: one tap or a pair of taps changes by one step.
 
-use super::lattice::Span;
+use super::lattice::IntegerSpan;
 use crate::design::DesignError;
 use crate::design::filters::response;
 use crate::design::limits::Stop;
@@ -29,7 +29,7 @@ pub(super) struct Descent<'a> {
     points: &'a [FrequencyPoint],
     ratio: usize,
     step: f64,
-    spans: &'a [Span],
+    spans: &'a [IntegerSpan],
     /// One list per channel.
     integers: Vec<Vec<f64>>,
     errors: Vec<CMat>,
@@ -45,7 +45,7 @@ impl<'a> Descent<'a> {
     /// Integers times `step` are the taps; `lags` are the same taps by lag, `spans` the bounds by tap.
     pub(super) fn new(
         points: &'a [FrequencyPoint],
-        spans: &'a [Span],
+        spans: &'a [IntegerSpan],
         step: f64,
         integers: Vec<Vec<f64>>,
         lags: &[Mat],

@@ -26,7 +26,7 @@ use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::spec::WordLengths;
 use problem::IntegerCandidate;
-use quantiser::Quantiser;
+use quantiser::TapQuantiser;
 
 /// Word lengths of a study, relative to the requested one.
 const NEIGHBOURS: [i32; 5] = [-2, -1, 0, 1, 2];
@@ -98,7 +98,7 @@ pub(super) fn quantise(
     bits: &WordLengths,
     fraction_bits: Option<i32>,
 ) -> Result<(FixedPoint, WordStudy), DesignError> {
-    let quantiser = Quantiser::new(problem)?;
+    let quantiser = TapQuantiser::new(problem)?;
     let all: Vec<WordLengths> = NEIGHBOURS.into_iter().filter_map(|more| bits.widened(more)).collect();
     let mut found = quantiser.quantise_all(&all, fraction_bits)?;
     // Integers that fit few bits fit more bits.

@@ -1,6 +1,6 @@
 //! The search at the two scales in question, and the choice among its candidates.
 
-use super::lattice::Span;
+use super::lattice::IntegerSpan;
 use super::problem::{IntegerCandidate, QuantisationProblem, TapError};
 use super::search::LatticeSearch;
 use super::{WordLoss, decades};
@@ -26,7 +26,7 @@ impl IntegerCandidate {
 }
 
 /// The search for integers near the taps of one bank.
-pub(super) struct Quantiser<'a> {
+pub(super) struct TapQuantiser<'a> {
     pub(super) error: TapError<'a>,
     /// The mean square that integers should keep to; infinite where only gamma counts.
     most_mean_square: f64,
@@ -34,7 +34,7 @@ pub(super) struct Quantiser<'a> {
     of_least_square: Option<Vec<Vec<f64>>>,
 }
 
-impl<'a> Quantiser<'a> {
+impl<'a> TapQuantiser<'a> {
     /// Samples the plant.
     ///
     /// # Errors
@@ -168,10 +168,10 @@ impl<'a> Quantiser<'a> {
             filter
                 .iter()
                 .enumerate()
-                .map(|(n, &tap)| (tap, Span::of(bits, n)))
+                .map(|(n, &tap)| (tap, IntegerSpan::of(bits, n)))
                 .filter(|(tap, span)| span.reaches(*tap))
         });
-        let nonzero: Vec<(f64, Span)> = spans.collect();
+        let nonzero: Vec<(f64, IntegerSpan)> = spans.collect();
         let fits = |scale: i32| {
             let factor = f64::from(scale).exp2();
             nonzero.iter().all(|(tap, span)| span.contains((tap * factor).round_ties_even()))

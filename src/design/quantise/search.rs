@@ -1,7 +1,7 @@
 //! Integers at one scale: closest lattice points with weights on the worst frequencies, then a descent.
 
 use super::descent::Descent;
-use super::lattice::{Span, closest};
+use super::lattice::{IntegerSpan, closest};
 use super::problem::{IntegerCandidate, Tap, TapError};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
@@ -26,13 +26,13 @@ pub(super) struct LatticeSearch<'a> {
     fraction_bits: i32,
     /// The real taps of least gamma, in units of the step.
     centre: Integers,
-    spans: Vec<Span>,
+    spans: Vec<IntegerSpan>,
 }
 
 impl<'a> LatticeSearch<'a> {
     pub(super) fn new(error: &'a TapError<'a>, bits: &'a WordLengths, fraction_bits: i32) -> Self {
         let centre = in_steps(error.problem.taps, fraction_bits);
-        let spans = (0..centre[0].len()).map(|n| Span::of(bits, n)).collect();
+        let spans = (0..centre[0].len()).map(|n| IntegerSpan::of(bits, n)).collect();
         Self { error, bits, fraction_bits, centre, spans }
     }
 
@@ -111,7 +111,7 @@ impl<'a> LatticeSearch<'a> {
             let taps = Tap::of_phase(phase, self.error, self.bits);
             let at = |tap: &Tap| phase + tap.lag * ratio;
             let centre: Vec<f64> = taps.iter().map(|tap| centre[tap.channel][at(tap)]).collect();
-            let spans: Vec<Span> = taps.iter().map(|tap| self.spans[at(tap)]).collect();
+            let spans: Vec<IntegerSpan> = taps.iter().map(|tap| self.spans[at(tap)]).collect();
             let found = closest(&correlations.factor(&taps, noise)?, &centre, &spans);
             for (tap, integer) in taps.iter().zip(found) {
                 integers[tap.channel][at(tap)] = integer;

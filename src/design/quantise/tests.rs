@@ -5,7 +5,7 @@ use crate::bank::SynthesisFilters;
 use crate::design::error_grid::ErrorGrid;
 use crate::design::filters::polyphase;
 use crate::design::plant::LiftedPlant;
-use crate::design::{Options, Problem, Stop, design};
+use crate::design::{DesignOptions, Problem, Stop, design};
 use crate::spec::{MAX_FRACTION_BITS, Spec};
 use std::sync::LazyLock;
 
@@ -16,7 +16,7 @@ const THESIS: &str = include_str!("../../../filters/thesis-fir.toml");
 /// A plant with the taps of its optimal FIR bank.
 fn optimum(spec: &str) -> (LiftedPlant, Vec<Vec<f64>>) {
     let spec = Spec::from_toml(spec, "spec.toml").unwrap();
-    let found = design(&spec, &Options::without_proof()).unwrap();
+    let found = design(&spec, &DesignOptions::without_proof()).unwrap();
     let SynthesisFilters::Fir(taps) = found.bank.filters else { unreachable!() };
     (LiftedPlant::new(&Problem::new(&spec, found.bank.latency).unwrap()), taps)
 }
@@ -25,8 +25,8 @@ fn problem<'a>(plant: &'a LiftedPlant, taps: &'a [Vec<f64>]) -> QuantisationProb
     QuantisationProblem { plant, taps, noise: &[], gamma_margin: 0.0, stop: &NEVER }
 }
 
-fn quantiser<'a>(plant: &'a LiftedPlant, taps: &'a [Vec<f64>]) -> Result<Quantiser<'a>, DesignError> {
-    Quantiser::new(problem(plant, taps))
+fn quantiser<'a>(plant: &'a LiftedPlant, taps: &'a [Vec<f64>]) -> Result<TapQuantiser<'a>, DesignError> {
+    TapQuantiser::new(problem(plant, taps))
 }
 
 /// The computed norm, which does not use the grid of the search.
@@ -281,7 +281,7 @@ fn the_taps_of_least_square_are_a_minimum() {
     let (plant, taps) = optimum(&THESIS.replace("taps = 22", "taps = 7"));
     let noise = [1e-3, 4e-3];
     let problem = QuantisationProblem { noise: &noise, ..problem(&plant, &taps) };
-    let quantiser = Quantiser::within(problem, 0.1).unwrap();
+    let quantiser = TapQuantiser::within(problem, 0.1).unwrap();
     let square = |taps: &[Vec<f64>]| {
         let own = taps.iter().zip(noise).map(|(f, power)| power * f.iter().map(|x| x * x).sum::<f64>());
         quantiser.error.grid.mean_square(&polyphase(taps, 2)) + own.sum::<f64>()

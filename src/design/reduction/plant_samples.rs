@@ -1,9 +1,9 @@
 //! Output matrices of least gamma for a given recursion. The error W - F H is affine in them, so that they
 //! solve a convex problem at sampled frequencies.
 
-use super::truncation::Recursion;
+use super::truncation::ReducedRecursion;
 use crate::design::DesignError;
-use crate::design::error_grid::{AffineError, LocatedPeak, Location};
+use crate::design::error_grid::{AffineError, GridFrequency, LocatedPeak};
 use crate::design::exchange::Exchange;
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
@@ -54,7 +54,7 @@ impl<'a> PlantSamples<'a> {
     /// The bank of least gamma with this recursion and, within `gamma_margin`, of least mean square.
     pub(super) fn best_bank(
         &self,
-        recursion: &Recursion,
+        recursion: &ReducedRecursion,
         gamma_margin: f64,
     ) -> Result<StateSpace, DesignError> {
         let regressors = FrequencyResponse::new(&recursion.regressors());
@@ -79,14 +79,14 @@ impl<'a> PlantSamples<'a> {
 /// The error of a given recursion as a function of the output matrices.
 struct OutputError<'a> {
     plant: &'a LiftedPlant,
-    recursion: &'a Recursion,
+    recursion: &'a ReducedRecursion,
     regressors: FrequencyResponse,
 }
 
 impl AffineError for OutputError<'_> {
     type Scenario = ();
 
-    fn at(&self, location: &Location<()>) -> FrequencyPoint {
+    fn at(&self, location: &GridFrequency<()>) -> FrequencyPoint {
         driving(&self.regressors, self.plant.at(location.frequency))
     }
 

@@ -31,7 +31,7 @@ fn a_choice_ends_with_the_design_that_was_ended() {
         }
     };
     let problem = Problem::before_sizing(&open).unwrap();
-    let refused = Sizing::new(&open, &problem, Comparison { observer: &follow, stop: &stop }).unwrap_err();
+    let refused = Sizing::new(&open, &problem, SizingControl { observer: &follow, stop: &stop }).unwrap_err();
     assert_eq!(refused, DesignError::Stopped);
 }
 
@@ -220,7 +220,7 @@ fn in_band(design: &str) -> Spec {
 fn figures_of(spec: &Spec, taps: usize) -> crate::figures::Figures {
     let mut sized = spec.clone();
     sized.design = sized.design.with_taps(Some(taps));
-    let bank = crate::design::design(&sized, &crate::design::Options::without_proof()).unwrap().bank;
+    let bank = crate::design::design(&sized, &crate::design::DesignOptions::without_proof()).unwrap().bank;
     crate::figures::Figures::new(&bank).unwrap()
 }
 
@@ -238,7 +238,8 @@ fn open_taps_bring_images_below_the_noise() {
     let taps = Sizing::of(&spec).unwrap().taps;
     let below = |taps: usize| {
         let quiet = in_band(&format!("taps = {taps}"));
-        let mut bank = crate::design::design(&quiet, &crate::design::Options::without_proof()).unwrap().bank;
+        let mut bank =
+            crate::design::design(&quiet, &crate::design::DesignOptions::without_proof()).unwrap().bank;
         bank.spec = Some(Spec { channels: spec.channels.clone(), ..quiet });
         let figures = crate::figures::Figures::new(&bank).unwrap();
         -figures.image.unwrap().db.0 - figures.snr.noise_db.unwrap().0

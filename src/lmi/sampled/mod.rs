@@ -32,7 +32,9 @@
 //! ```
 //! use hybank::linalg::{CMat, Complex};
 //! use hybank::lmi::FINEST_GAP;
-//! use hybank::lmi::sampled::{MeanSquareObjective, FrequencyPoint, SampledProblem, mean_square_under_cap, minimise};
+//! use hybank::lmi::sampled::{
+//!     FrequencyPoint, MeanSquareObjective, SampledProblem, mean_square_under_cap, minimise,
+//! };
 //! // Three taps F that undo an echo of half the size: the least maximum of |1 - F (1 + z^-1 / 2)| is 1/8.
 //! let scalar = |x| CMat::from_element(1, 1, x);
 //! let point = |l: u32| {

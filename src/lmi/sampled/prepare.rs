@@ -76,8 +76,8 @@ impl ReducedProblem {
         image
     }
 
-    /// `2 Re sum_l e^{i omega_l j} (y_l h_l*)_{p,i}` for all unknowns: the adjoint of [`ReducedProblem::image`]
-    /// for the inner product `2 Re sum tr(y* k)`.
+    /// `2 Re sum_l e^{i omega_l j} (y_l h_l*)_{p,i}` for all unknowns: the adjoint of
+    /// [`ReducedProblem::image`] for the inner product `2 Re sum tr(y* k)`.
     pub(super) fn adjoint(&self, y: &MatrixBlocks) -> Vec<f64> {
         let mut e = MatrixBlocks::zeros(self.count(), self.layout.rows, self.layout.channels);
         for l in 0..self.count() {

@@ -15,7 +15,7 @@
 
 use super::super::ball::{self, Ball, Matrix};
 use super::super::front_ends::{Equations, FrontEnds};
-use super::super::state_transition::{StateTransition, state_transition};
+use super::super::state_transition::{EnclosedTransition, state_transition};
 use super::super::timeline::SamplingInstant;
 use crate::arithmetic::{DoubleDouble, Float512, Number};
 use crate::units::{FastPeriods, GridTime, Seconds};
@@ -106,7 +106,7 @@ pub(super) fn row_norm(signal: Option<&Equations>, filter: Equations, ratio: usi
 /// A bound on the sum of |r(n M)|; `None` if the precision of F does not suffice.
 fn square_of_row<F: Number>(front_ends: &FrontEnds, sample: &SamplingInstant, ratio: usize) -> Option<f64> {
     let (a, b) = front_ends.dynamics::<F>();
-    let StateTransition { transition, gramian } = state_transition(&a, &b, Ball::from(ratio as f64));
+    let EnclosedTransition { transition, gramian } = state_transition(&a, &b, Ball::from(ratio as f64));
     let row = front_ends.output(sample);
     let state = steady_state(&transition, &gramian)?;
     absolute_sum(&row, &transition, &ball::product_transposed(&state, &row))

@@ -101,7 +101,7 @@ fn zero_columns_of_triangles_are_not_multiplied() {
     let mut filter = random(24, 1, 2, None, &mut noise);
     (0..24).for_each(|i| filter.a[i][..i].fill(0.0));
     let plan = Recursive::new(&filter, 1, 2, Isa::detect()).unwrap();
-    let Form::Dense(tiles) = &plan.recursion.form else { panic!("a triangle is no section") };
+    let RecursionForm::Dense(tiles) = &plan.recursion.form else { panic!("a triangle is no section") };
     let columns: Vec<usize> = tiles.iter().map(|tile| tile.columns.len()).collect();
     assert_eq!(columns[0], 24);
     assert!(columns[1..].iter().all(|&count| count < 24), "{columns:?}");

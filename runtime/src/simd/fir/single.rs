@@ -12,7 +12,7 @@
 
 use super::super::dispatch::keep_branch;
 use super::super::vector::Vector;
-use super::tiling::{Chunk, Job, Pairing, sized, tile_size};
+use super::tiling::{FrameChunk, Job, Pairing, sized, tile_size};
 
 /// A single phase on all frames of a job, in vectors of one group.
 pub(super) struct Single<'a, V: Vector, const D: usize> {
@@ -43,7 +43,7 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
 
     /// Blocks of as many frames as a group has lanes: their sums are added together.
     #[inline(always)]
-    unsafe fn chunk(&mut self, &Chunk { x, out, frames }: &Chunk<V::Sample>) {
+    unsafe fn chunk(&mut self, &FrameChunk { x, out, frames }: &FrameChunk<V::Sample>) {
         let Job { tiling, scratch, .. } = *self.job;
         let pairing = tiling.pairing;
         // Vectors of a block in each of the tiles, and blocks at once: of twelve sums three blocks of 8 are
