@@ -12,7 +12,7 @@ use hybank::io::{Container, MultiReader, OutputHeader, PcmFormat, PcmFrames, Sam
 use hybank::messages::Quoted;
 use hybank::overview::BeforeAfter;
 use hybank::pipeline::DroppedLatency;
-use hybank::runtime::{InputFrames, Isa};
+use hybank::runtime::{FrameSource, Isa};
 
 /// The options.
 #[derive(Debug, Clone, Copy, clap::Args)]

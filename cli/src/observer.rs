@@ -8,7 +8,7 @@ use hybank::bank::Bank;
 use hybank::calibrate::{Agreement, Verdict};
 use hybank::io::{PcmFrames, Stall};
 use hybank::pipeline::{Gap, Pipeline};
-use hybank::runtime::InputFrames;
+use hybank::runtime::FrameSource;
 use serde::Serialize;
 use serde_json::json;
 use std::collections::BTreeSet;

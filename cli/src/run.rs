@@ -15,7 +15,7 @@ use hybank::io::{
     Placement, ReadOptions, is_sigmf,
 };
 use hybank::pipeline::{DroppedLatency, FileOutputs, Outcome, Pipeline, Settings, Warning};
-use hybank::runtime::{Algorithm, InputFrames, Options, Plan, Precision, ThreadPool};
+use hybank::runtime::{Algorithm, FrameSource, Options, Plan, Precision, ThreadPool};
 use std::path::{Path, PathBuf};
 
 /// Options of the commands that fuse.

@@ -10,7 +10,7 @@ use hybank::io::{Container, PcmFormat, SampleWriter, is_same_rate};
 use hybank::messages::{Quoted, counted};
 use hybank::overview::understood;
 use hybank::quantity::readable;
-use hybank::simulate::ImperfectSampler;
+use hybank::simulate::Sampler;
 use hybank::spec::{ChannelSpec, Spec};
 use hybank::units::Hertz;
 use std::path::PathBuf;
@@ -161,7 +161,7 @@ struct CaptureRun<'a> {
 
 impl CaptureRun<'_> {
     /// The samples of channel `i`, and how many of their parts `clipped`.
-    fn capture(&self, i: usize, converter: &ImperfectSampler, clipped: &mut usize) -> Parts {
+    fn capture(&self, i: usize, converter: &Sampler, clipped: &mut usize) -> Parts {
         let Self { problem, signal, frames, .. } = *self;
         let delivered = signal.analog.captured(problem, i, converter, self.args.gain, frames);
         *clipped = delivered.clipped;

@@ -4,7 +4,7 @@ use super::capture_file::{CaptureFile, ReadingRules};
 use super::print::Failure;
 use hybank::design::Problem;
 use hybank::messages::Quoted;
-use hybank::simulate::{self, Analog, ComplexSource, MOST_SAMPLES, PeriodicRecording, Source};
+use hybank::simulate::{self, Analog, ComplexSource, MOST_SAMPLES, Periodic, Source};
 use hybank::spec::Spec;
 use hybank::units::FastPeriods;
 use std::path::Path;
@@ -130,7 +130,7 @@ impl SignalReader<'_> {
         let (rate, samples) = (recording.rate, recording.finite(path)?);
         // In normalised time the recording's own rate is the fast rate.
         let fast = if self.spec.is_normalised() { rate } else { self.spec.fast_period.rate() };
-        Ok(Analog::Recorded(PeriodicRecording::new(&samples, FastPeriods(fast / rate))))
+        Ok(Analog::Recorded(Periodic::new(&samples, FastPeriods(fast / rate))))
     }
 }
 

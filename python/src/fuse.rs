@@ -11,7 +11,7 @@ use hybank::calibrate::{Agreement, Record, Verdict, agreement, comparable, frame
 use hybank::design::MissingSamples;
 use hybank::io::OfflineSamples;
 use hybank::pipeline::{self, DroppedLatency, Gap, GapEstimator, GapSummary, Outcome, Settings, Warning};
-use hybank::runtime::{Algorithm, Frames, InputFrames, Options, PcmFormat, Plan, Precision, ThreadPool};
+use hybank::runtime::{Algorithm, FrameSource, Frames, Options, PcmFormat, Plan, Precision, ThreadPool};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
 use std::sync::Arc;
@@ -129,7 +129,7 @@ fn filtered<'py>(
     let (parts, mut room) = (held.parts()?, array.room()?);
     let parts: Vec<_> = parts.iter().map(Vec::as_slice).collect();
     let parts: Vec<_> = parts.iter().map(|part| Frames::new(part, 0..frames)).collect();
-    let parts: Vec<&dyn InputFrames> = parts.iter().map(|part| part as _).collect();
+    let parts: Vec<&dyn FrameSource> = parts.iter().map(|part| part as _).collect();
     let signals = Signals::new();
     let stop = || signals.raised();
     let outcome = py.detach(|| pipeline::fuse(bank, &plan, &parts, &mut room, settings, &stop));

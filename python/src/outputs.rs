@@ -4,7 +4,7 @@ use crate::arrays::{ArrayShape, Held};
 use crate::errors::{file_error, refused};
 use crate::formats::ArrayFormat;
 use hybank::files::AtomicFile;
-use hybank::runtime::{InputFrames, Isa, OutputFrames, PcmOutput, Sample};
+use hybank::runtime::{FrameSink, FrameSource, Isa, PcmOutput, Sample};
 use numpy::{PyArray1, PyArrayMethods, PyReadwriteArray1};
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
@@ -71,7 +71,7 @@ pub(crate) fn encode<'py>(
     Ok((array.finish()?, clipped))
 }
 
-fn convert<T: Sample>(samples: &dyn InputFrames, frames: usize, room: &mut dyn OutputFrames) {
+fn convert<T: Sample>(samples: &dyn FrameSource, frames: usize, room: &mut dyn FrameSink) {
     let mut numbers = vec![T::default(); frames];
     samples.load(Isa::detect(), 0, &mut numbers);
     room.store(Isa::detect(), 0, &numbers);

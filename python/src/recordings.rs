@@ -3,7 +3,7 @@
 use crate::errors::{io_error, no_others};
 use crate::formats::ArrayFormat;
 use hybank::io::FrameFile;
-use hybank::runtime::{InputFrames, Isa, PcmFrames, Precision, Sample};
+use hybank::runtime::{FrameSource, Isa, PcmFrames, Precision, Sample};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -83,7 +83,7 @@ impl Recording {
         let frames = [PcmFrames { layout: header.layout, channels: columns, bytes }];
         let count = frames[0].frames();
         let mut numbers = vec![T::default(); count * columns];
-        py.detach(|| (&frames.as_slice() as &dyn InputFrames).load(Isa::detect(), 0, &mut numbers));
+        py.detach(|| (&frames.as_slice() as &dyn FrameSource).load(Isa::detect(), 0, &mut numbers));
         let array: Bound<'py, PyArray2<T>> = PyArray1::from_vec(py, numbers).reshape([count, columns])?;
         if header.is_complex { array.call_method1("view", (self.dtype(),)) } else { Ok(array.into_any()) }
     }

@@ -9,7 +9,7 @@ use crate::values::{numbers, shares, times};
 use hybank::captures::ChannelSamples;
 use hybank::design::Problem;
 use hybank::simulate::{
-    Analog, ComplexSource, Delivered, ErrorLists, PeriodicRecording, RefusedError, Signal, Source,
+    Analog, ComplexSource, Delivered, ErrorLists, Periodic, RefusedError, Signal, Source,
 };
 use hybank::spec::Spec;
 use hybank::units::{FastPeriods, Hertz};
@@ -120,7 +120,7 @@ fn part(spec: &Spec, signal: &Bound<'_, PyAny>, rate: Option<f64>) -> PyResult<S
     let held = Held::new(signal, ArrayShape { axis: -1, channels: 1 })?;
     let channel = held.captures()?.channels.into_iter().next().unwrap_or_default();
     let ChannelSamples { samples, imaginary, .. } = channel.finite().map_err(refused)?;
-    let part = |samples: &[f64]| Analog::Recorded(PeriodicRecording::new(samples, FastPeriods(fast / rate)));
+    let part = |samples: &[f64]| Analog::Recorded(Periodic::new(samples, FastPeriods(fast / rate)));
     Ok(Signal { real: part(&samples), imaginary: imaginary.as_deref().map(part) })
 }
 

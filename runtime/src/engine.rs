@@ -6,7 +6,7 @@
 
 #[cfg(feature = "rayon")]
 use crate::adapters::SplitOutput;
-use crate::adapters::{InputFrames, OutputFrames};
+use crate::adapters::{FrameSink, FrameSource};
 use crate::algorithms::{AlgorithmFacts, Direct, Filter, OverlapSave, Recursive};
 use crate::sample::Sample;
 use crate::state::{Count, StateNumbers};
@@ -60,7 +60,7 @@ impl Engine {
     }
 
     /// See [`Filter::process`].
-    pub(crate) fn process(&mut self, input: &dyn InputFrames, output: &mut dyn OutputFrames) -> u64 {
+    pub(crate) fn process(&mut self, input: &dyn FrameSource, output: &mut dyn FrameSink) -> u64 {
         each!(self, it => it.filter.process(&mut it.state, input, output))
     }
 
@@ -68,7 +68,7 @@ impl Engine {
     #[cfg(feature = "rayon")]
     pub(crate) fn process_parallel(
         &mut self,
-        input: &dyn InputFrames,
+        input: &dyn FrameSource,
         output: &mut dyn SplitOutput,
         pool: &crate::ThreadPool,
     ) -> u64 {

@@ -1,7 +1,7 @@
 #![doc = include_str!("../README.md")]
 //!
-//! Samples need not be interleaved: [`Stream::run`] takes any [`InputFrames`] and gives to any
-//! [`OutputFrames`], such as a slice per channel ([`Planar`]) and recordings as they lie in files
+//! Samples need not be interleaved: [`Stream::run`] takes any [`FrameSource`] and gives to any
+//! [`FrameSink`], such as a slice per channel ([`Planar`]) and recordings as they lie in files
 //! ([`PcmFrames`], [`PcmOutput`]). Complex samples (IQ) are two streams through one plan, one for the real
 //! parts and one for the imaginary ones, which [`PcmFrames::part`] and `PcmOutput::part` pick out by a
 //! stride.
@@ -55,7 +55,7 @@ mod stream;
 mod tests;
 
 pub use adapters::{
-    Frames, Halves, InputFrames, Interleaved, OutputFrames, PcmOutput, Planar, SplitOutput, Zeros,
+    FrameSink, FrameSource, Frames, Halves, Interleaved, PcmOutput, Planar, SplitOutput, Zeros,
 };
 pub use algorithms::choice::{Algorithm, ParseAlgorithmError, Precision};
 pub use algorithms::recursive::{DelayLines, DelayedInput, StateMatrices};

@@ -2,7 +2,7 @@
 
 #[cfg(feature = "rayon")]
 use crate::adapters::SplitOutput;
-use crate::adapters::{InputFrames, Interleaved, OutputFrames, WithoutOffsets, Zeros};
+use crate::adapters::{FrameSink, FrameSource, Interleaved, WithoutOffsets, Zeros};
 use crate::engine::Engine;
 use crate::state::{Count, StateHeader, StateNumbers};
 use crate::{Plan, ProcessError, Sample, StateError};
@@ -102,8 +102,8 @@ impl Stream {
     /// As [`Stream::process`].
     pub fn run(
         &mut self,
-        input: &dyn InputFrames,
-        output: &mut dyn OutputFrames,
+        input: &dyn FrameSource,
+        output: &mut dyn FrameSink,
     ) -> Result<usize, ProcessError> {
         let frames = self.check(input, output)?;
         self.replaced += match self.plan.offsets() {
@@ -124,7 +124,7 @@ impl Stream {
     #[cfg(feature = "rayon")]
     pub fn run_parallel(
         &mut self,
-        input: &dyn InputFrames,
+        input: &dyn FrameSource,
         output: &mut dyn SplitOutput,
         pool: &crate::ThreadPool,
     ) -> Result<usize, ProcessError> {
@@ -142,7 +142,7 @@ impl Stream {
     ///
     /// # Errors
     /// [`ProcessError::OutputTooShort`]; nothing is processed then.
-    pub fn flush(&mut self, output: &mut dyn OutputFrames) -> Result<usize, ProcessError> {
+    pub fn flush(&mut self, output: &mut dyn FrameSink) -> Result<usize, ProcessError> {
         let zeros = Zeros { channels: self.channels(), frames: self.plan.flush_frames() };
         let frames = self.check(&zeros, output)?;
         // Zeros without offsets: what no converter delivered.
@@ -201,7 +201,7 @@ impl Stream {
     }
 
     /// The frames of a call, if everything fits.
-    fn check(&self, input: &dyn InputFrames, output: &dyn OutputFrames) -> Result<usize, ProcessError> {
+    fn check(&self, input: &dyn FrameSource, output: &dyn FrameSink) -> Result<usize, ProcessError> {
         if input.channels() != self.channels() {
             return Err(ProcessError::Channels { given: input.channels(), wanted: self.channels() });
         }

@@ -5,7 +5,7 @@ use crate::calibrate::CalibrateError;
 use crate::calibrate::testbench::gaussian;
 use crate::design::Problem;
 use crate::random::Random;
-use crate::simulate::{Analog, ImperfectSampler, PeriodicRecording};
+use crate::simulate::{Analog, Periodic, Sampler};
 use crate::spec::HALF_WIDTH;
 use crate::units::FastPeriods;
 use std::f64::consts::{PI, TAU};
@@ -40,7 +40,7 @@ struct Recorder {
 const PLAIN: Recorder = Recorder { late: 0, delay: 0.0, ppm: 0.0, gain: 1.0, offset: 0.0 };
 
 /// Noise with pauses, up to 2 kHz.
-fn event(samples: usize, dice: &mut Random) -> PeriodicRecording {
+fn event(samples: usize, dice: &mut Random) -> Periodic {
     let (mut y, mut z) = (0.0, 0.0);
     let loud = |k: usize| if (k / 6000) % 4 == 3 { 0.0 } else { 0.2 };
     let wave: Vec<f64> = (0..samples)
@@ -50,28 +50,23 @@ fn event(samples: usize, dice: &mut Random) -> PeriodicRecording {
             z
         })
         .collect();
-    PeriodicRecording::new(&wave, FastPeriods(1.0))
+    Periodic::new(&wave, FastPeriods(1.0))
 }
 
 /// What the recorders deliver of an event, as long as each of `frames` says.
-fn recorded(
-    event: &PeriodicRecording,
-    recorders: &[Recorder],
-    frames: &[usize],
-    noise: f64,
-) -> Vec<Vec<f64>> {
+fn recorded(event: &Periodic, recorders: &[Recorder], frames: &[usize], noise: f64) -> Vec<Vec<f64>> {
     let spec = Spec { uncertainty: None, ..spec(recorders.len()) };
     let problem = Problem::new(&spec, 16).unwrap();
     let signal = Analog::Recorded(event.clone());
     let of = |(i, (recorder, frames)): (usize, (&Recorder, &usize))| {
-        let converter = ImperfectSampler {
+        let converter = Sampler {
             delay_error: FastPeriods(recorder.delay),
             gain_error: recorder.gain - 1.0,
             offset: recorder.offset,
             drift: 1e-6 * recorder.ppm,
             noise,
             seed: 7,
-            ..ImperfectSampler::ideal()
+            ..Sampler::ideal()
         };
         let all = converter.capture(&problem, i, &signal, 1.0, recorder.late + frames);
         all.samples[recorder.late..].to_vec()

@@ -6,7 +6,7 @@
 
 use super::record::Record;
 use crate::linalg::{Complex, fourier};
-use crate::simulate::{Instants, PeriodicRecording};
+use crate::simulate::{Instants, Periodic};
 use crate::sine_fit::Channel;
 use crate::units::FastPeriods;
 use std::f64::consts::TAU;
@@ -100,7 +100,7 @@ pub(crate) fn steadied(record: &Record, first: usize, length: usize, rate: f64) 
         stretch(record, first as i64 - INTERPOLATION_MARGIN as i64, length + 2 * INTERPOLATION_MARGIN);
     let begin = INTERPOLATION_MARGIN as f64 - 0.5 * rate * (length as f64 - 1.0);
     let instants = Instants { first: FastPeriods(begin), step: FastPeriods(1.0 + rate), count: length };
-    let steady = PeriodicRecording::new(&around, FastPeriods(1.0)).sample_through(|_| Complex::ONE, instants);
+    let steady = Periodic::new(&around, FastPeriods(1.0)).sample_through(|_| Complex::ONE, instants);
     for ((sample, steady), own) in part.samples.iter_mut().zip(steady).zip(&around[INTERPOLATION_MARGIN..]) {
         *sample += steady - own;
     }
@@ -113,8 +113,7 @@ pub(crate) fn interpolated(record: &Record, instants: Instants) -> Vec<f64> {
     let length = (instants.step.0 * instants.count as f64) as usize + 2 * INTERPOLATION_MARGIN + 1;
     let around = stretch(record, begin, length);
     let first = FastPeriods(instants.first.0 - begin as f64);
-    PeriodicRecording::new(&around, FastPeriods(1.0))
-        .sample_through(|_| Complex::ONE, Instants { first, ..instants })
+    Periodic::new(&around, FastPeriods(1.0)).sample_through(|_| Complex::ONE, Instants { first, ..instants })
 }
 
 /// The correlations of a stretch of `size` samples with a shorter one: at index l that of its samples from l

@@ -22,7 +22,7 @@ use super::record::Record;
 use super::warning::CalibrationWarning;
 use crate::linalg::least_squares::{LeastSquares, NoMinimum, NormalEquations, StepLimits, minimise};
 use crate::linalg::{Mat, fourier};
-use crate::simulate::{Instants, PeriodicRecording};
+use crate::simulate::{Instants, Periodic};
 use crate::sine_fit::{Channel, Estimate};
 use crate::units::{FastPeriods, RadiansPerFastPeriod};
 
@@ -53,7 +53,7 @@ pub(super) struct Training<'a> {
     model: &'a ChannelModel,
     records: &'a [Record],
     settings: CalibrationSettings,
-    recording: PeriodicRecording,
+    recording: Periodic,
 }
 
 impl<'a> Training<'a> {
@@ -68,7 +68,7 @@ impl<'a> Training<'a> {
         if !(is_usable && spacing.0 > 0.0 && spacing.0.is_finite()) {
             return Err(CalibrateError::Waveform { samples: samples.len(), spacing });
         }
-        Ok(Self { model, records, settings, recording: PeriodicRecording::new(samples, spacing) })
+        Ok(Self { model, records, settings, recording: Periodic::new(samples, spacing) })
     }
 
     /// Calibrates. The reference comes first: its lag is the best start for the others.
@@ -184,7 +184,7 @@ impl<'a> Training<'a> {
 struct ChannelFit<'a> {
     channel: usize,
     record: &'a Record,
-    recording: &'a PeriodicRecording,
+    recording: &'a Periodic,
     model: &'a ChannelModel,
     ratio: f64,
     /// D + L, g, o, ln c.

@@ -83,7 +83,7 @@ impl Tolerances {
 
 /// Unknowns with what their error peaks at.
 #[derive(Debug, Clone)]
-pub(super) struct ExchangeCandidate<S> {
+pub(super) struct TapCandidate<S> {
     /// `F_j`, M x N.
     pub(super) taps: Taps,
     /// Estimate of their gamma; equal to gamma if no peak was missed.
@@ -94,7 +94,7 @@ pub(super) struct ExchangeCandidate<S> {
 
 /// The solution on the points.
 struct Round<S> {
-    candidate: ExchangeCandidate<S>,
+    candidate: TapCandidate<S>,
     is_solved: bool,
 }
 
@@ -156,7 +156,7 @@ impl<E: AffineError> Exchange<E> {
     ///
     /// # Errors
     /// [`DesignError`] if a decomposition does not converge.
-    pub(super) fn optimise(&mut self) -> Result<ExchangeCandidate<E::Scenario>, DesignError> {
+    pub(super) fn optimise(&mut self) -> Result<TapCandidate<E::Scenario>, DesignError> {
         self.optimise_at(Tolerances::steady(GAMMA_ACCURACY))
     }
 
@@ -167,7 +167,7 @@ impl<E: AffineError> Exchange<E> {
     pub(super) fn optimise_at(
         &mut self,
         tolerances: Tolerances,
-    ) -> Result<ExchangeCandidate<E::Scenario>, DesignError> {
+    ) -> Result<TapCandidate<E::Scenario>, DesignError> {
         let least = self.minimise_gamma(tolerances)?;
         self.leave_out_inactive(&least, tolerances.active)?;
         self.minimise_mean_square(least, tolerances)
@@ -188,10 +188,7 @@ impl<E: AffineError> Exchange<E> {
         known < self.locations.len()
     }
 
-    fn minimise_gamma(
-        &mut self,
-        tolerances: Tolerances,
-    ) -> Result<ExchangeCandidate<E::Scenario>, DesignError> {
+    fn minimise_gamma(&mut self, tolerances: Tolerances) -> Result<TapCandidate<E::Scenario>, DesignError> {
         let mut tolerance = tolerances.tolerance(f64::INFINITY);
         let mut last = self.round(tolerances, tolerance)?;
         let mut best = last.candidate.clone();
@@ -232,7 +229,7 @@ impl<E: AffineError> Exchange<E> {
     /// objective raises the gain there, it is a peak and becomes a point again.
     fn leave_out_inactive(
         &mut self,
-        start: &ExchangeCandidate<E::Scenario>,
+        start: &TapCandidate<E::Scenario>,
         share: f64,
     ) -> Result<(), DesignError> {
         if share == 0.0 {
@@ -259,9 +256,9 @@ impl<E: AffineError> Exchange<E> {
     /// `start` if the interior-point method makes no progress from there.
     fn minimise_mean_square(
         &mut self,
-        start: ExchangeCandidate<E::Scenario>,
+        start: TapCandidate<E::Scenario>,
         tolerances: Tolerances,
-    ) -> Result<ExchangeCandidate<E::Scenario>, DesignError> {
+    ) -> Result<TapCandidate<E::Scenario>, DesignError> {
         let cap = start.estimate * (1.0 + self.gamma_margin);
         let cap_at_points = start.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
         for _ in 0..tolerances.rounds {
@@ -292,16 +289,11 @@ impl<E: AffineError> Exchange<E> {
 
     /// The taps with the peaks of their error. None is searched once the design is stopped: `gamma`, that of
     /// the points, stands for them.
-    fn judge(
-        &self,
-        taps: Taps,
-        gamma: f64,
-        level: f64,
-    ) -> Result<ExchangeCandidate<E::Scenario>, DesignError> {
+    fn judge(&self, taps: Taps, gamma: f64, level: f64) -> Result<TapCandidate<E::Scenario>, DesignError> {
         let peaks = if self.stop.is_due() { Vec::new() } else { self.error.peaks(&taps, level)? };
         let estimate = peaks.iter().map(|peak| peak.gain).fold(gamma, f64::max);
         let above = peaks.into_iter().filter(|peak| peak.gain > level).map(|peak| peak.location).collect();
-        Ok(ExchangeCandidate { taps, estimate, above })
+        Ok(TapCandidate { taps, estimate, above })
     }
 
     fn raise_lower_bound(&mut self, lower: LowerBound) {

@@ -22,7 +22,7 @@ const REACH: usize = 16;
 const KEPT: f64 = 0.45;
 
 /// Recordings with their clocks, in periods of the output.
-pub(super) struct ClockedRecordings {
+pub(super) struct Clocked {
     pub(super) recordings: Vec<Recording>,
     pub(super) found: Vec<SourceEstimate>,
     pub(super) gains: Vec<f64>,
@@ -43,7 +43,7 @@ pub(super) fn placed(
     sources: &[MergeSource],
     rate: Hertz,
     within: Option<Seconds>,
-) -> Result<ClockedRecordings, MergeError> {
+) -> Result<Clocked, MergeError> {
     if let Some(flat) = sources.iter().find(|source| is_flat(&source.record)) {
         return Err(MergeError::NoSignal { name: flat.name.clone() });
     }
@@ -82,10 +82,10 @@ fn plain(start: Seconds) -> SourceEstimate {
     SourceEstimate { start, drift: None, gain: None, noise: 0.0, steps: Vec::new() }
 }
 
-fn alone(source: &MergeSource, rate: Hertz) -> ClockedRecordings {
+fn alone(source: &MergeSource, rate: Hertz) -> Clocked {
     let (samples, level) = usable(&source.record);
     let clock = Clock::even(FastPeriods(0.0), FastPeriods(rate.0 / source.rate.0));
-    ClockedRecordings {
+    Clocked {
         recordings: vec![recording(&samples, clock, 0, level)],
         found: vec![plain(Seconds(0.0))],
         gains: vec![1.0],
@@ -96,7 +96,7 @@ fn alone(source: &MergeSource, rate: Hertz) -> ClockedRecordings {
     }
 }
 
-fn by_stamps(sources: &[MergeSource], rate: Hertz) -> Result<ClockedRecordings, MergeError> {
+fn by_stamps(sources: &[MergeSource], rate: Hertz) -> Result<Clocked, MergeError> {
     let stamps = |source: &MergeSource| source.stamps.clone().unwrap_or_default();
     let origin = stamps(&sources[0]).first().copied().unwrap_or(Seconds(0.0));
     let level = usable(&sources[0].record).1;
@@ -111,7 +111,7 @@ fn by_stamps(sources: &[MergeSource], rate: Hertz) -> Result<ClockedRecordings, 
         found.push(plain(stamps.first().map_or(Seconds(0.0), |first| *first - origin)));
     }
     let count = sources.len();
-    Ok(ClockedRecordings {
+    Ok(Clocked {
         recordings,
         found,
         gains: vec![1.0; count],
@@ -126,7 +126,7 @@ fn by_alignment(
     sources: &[MergeSource],
     rate: Hertz,
     within: Option<Seconds>,
-) -> Result<ClockedRecordings, MergeError> {
+) -> Result<Clocked, MergeError> {
     let own = sources[0].rate;
     let records: Vec<Record> = sources.iter().map(|source| at_rate(source, own)).collect::<Result<_, _>>()?;
     // The spec counts in samples.
@@ -161,7 +161,7 @@ fn by_alignment(
         )
     };
     let warnings = alignment.warnings.iter().filter(|warning| !is_of_fixed(warning)).cloned();
-    Ok(ClockedRecordings {
+    Ok(Clocked {
         recordings,
         found,
         gains: gains.iter().map(|gain| gain.value).collect(),

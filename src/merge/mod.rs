@@ -17,7 +17,7 @@ use crate::calibrate::Record;
 use crate::instants::{Fused, FusionSettings, Model, Prior, Recording, fuse};
 use crate::sine_fit::Estimate;
 use crate::units::{CyclesPerFastPeriod, Decibels, FastPeriods, Hertz, Seconds};
-use clocks::ClockedRecordings;
+use clocks::Clocked;
 
 /// Passes in which the spectrum is learned; a third gains nothing.
 const PASSES: usize = 2;
@@ -121,15 +121,8 @@ impl Quality {
 /// [`MergeError`].
 pub fn merge(sources: &[MergeSource], settings: MergeSettings) -> Result<Merged, MergeError> {
     let rate = output_rate(sources, settings)?;
-    let ClockedRecordings {
-        recordings,
-        found,
-        gains,
-        gain_deviations,
-        delay_deviations,
-        level,
-        mut warnings,
-    } = clocks::placed(sources, rate, settings.within)?;
+    let Clocked { recordings, found, gains, gain_deviations, delay_deviations, level, mut warnings } =
+        clocks::placed(sources, rate, settings.within)?;
     let (first, grid) = grid(sources, &recordings, rate)?;
     check_memory(grid.count)?;
     let step_noise = |source: &MergeSource| source.step * source.step / 12.0;

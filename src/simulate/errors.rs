@@ -1,6 +1,6 @@
 //! How the virtual converters of a spec differ from what it says, with the limits of that.
 
-use super::{Analog, ImperfectSampler, Quantiser};
+use super::{Analog, Quantiser, Sampler};
 use crate::design::uncertainty::{Refused, of};
 use crate::quantity::Time;
 use crate::spec::{
@@ -74,7 +74,7 @@ pub struct VirtualConverter {
     /// What was asked for.
     pub errors: ErrorsOfConverter,
     /// The converter, with the offset of the spec.
-    pub converter: ImperfectSampler,
+    pub converter: Sampler,
 }
 
 /// A field of [`ErrorLists`] that is refused.
@@ -163,7 +163,7 @@ impl ErrorLists {
                 offset: offsets[i],
                 drift: drift[i],
             },
-            converter: ImperfectSampler {
+            converter: Sampler {
                 delay_error: Seconds(delays[i]).in_fast_periods(spec.fast_period),
                 gain_error: gains[i],
                 offset: channel.offset + offsets[i],
@@ -214,7 +214,7 @@ fn check_jitter(rms: Seconds, fast_period: Seconds, signal: &Analog) -> Result<(
         return Err(ErrorRule::Jitter { rms, jitter });
     }
     let Analog::Recorded(recording) = signal else { return Ok(()) };
-    let (reach, most): (FastPeriods, _) = (jitter * ImperfectSampler::MOST_SIGMAS, recording.most_shift());
+    let (reach, most): (FastPeriods, _) = (jitter * Sampler::MOST_SIGMAS, recording.most_shift());
     if reach <= most { Ok(()) } else { Err(ErrorRule::JitterOfRecording { reach, most }) }
 }
 

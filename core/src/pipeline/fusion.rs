@@ -5,7 +5,7 @@ use super::gaps::{GapEstimator, GapFiller};
 use super::{Gap, Outcome};
 use crate::bank::Bank;
 use crate::runtime::{
-    InputFrames, Interleaved, Isa, OutputFrames, Plan, ProcessError, SplitOutput, Stream, ThreadPool,
+    FrameSink, FrameSource, Interleaved, Isa, Plan, ProcessError, SplitOutput, Stream, ThreadPool,
 };
 use std::ops::Range;
 use std::sync::Arc;
@@ -132,16 +132,16 @@ impl<'a> Fusion<'a> {
     /// `output`; returns how many.
     pub(super) fn step(
         &mut self,
-        parts: &[impl InputFrames],
+        parts: &[impl FrameSource],
         most: usize,
         output: &mut dyn SplitOutput,
     ) -> Result<usize, ProcessError> {
-        let frames = parts.first().map_or(0, InputFrames::frames);
+        let frames = parts.first().map_or(0, FrameSource::frames);
         match &mut self.gaps {
             None => self.filter(parts, frames, most, output),
             Some(gaps) => {
                 let wanted = self.streams[0].channels();
-                if let Some(given) = parts.iter().map(InputFrames::channels).find(|given| *given != wanted) {
+                if let Some(given) = parts.iter().map(FrameSource::channels).find(|given| *given != wanted) {
                     return Err(ProcessError::Channels { given, wanted });
                 }
                 let frames = gaps.fill(parts);
@@ -168,7 +168,7 @@ impl<'a> Fusion<'a> {
 
     fn filter(
         &mut self,
-        parts: &[impl InputFrames],
+        parts: &[impl FrameSource],
         frames: usize,
         most: usize,
         output: &mut dyn SplitOutput,
@@ -242,7 +242,7 @@ impl<'a> Fusion<'a> {
 /// Filters frames; of their outputs only those in `kept` are stored, if not all are.
 fn run(
     stream: &mut Stream,
-    input: &dyn InputFrames,
+    input: &dyn FrameSource,
     kept: Option<Range<usize>>,
     output: &mut dyn SplitOutput,
     workers: Option<&ThreadPool>,
@@ -256,7 +256,7 @@ fn run(
 
 /// Room for some of the outputs of a call; the others are dropped before they are encoded.
 struct Kept<'a> {
-    output: &'a mut dyn OutputFrames,
+    output: &'a mut dyn FrameSink,
     range: Range<usize>,
 }
 
@@ -268,7 +268,7 @@ impl Kept<'_> {
     }
 }
 
-impl OutputFrames for Kept<'_> {
+impl FrameSink for Kept<'_> {
     fn capacity(&self) -> usize {
         usize::MAX
     }

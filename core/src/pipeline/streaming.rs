@@ -4,7 +4,7 @@ use super::fusion::Fusion;
 use super::{Gap, Outcome, PipelineError, Settings};
 use crate::bank::Bank;
 use crate::io::{IoError, PcmFormat, PcmFrames};
-use crate::runtime::{Frames, InputFrames, PcmOutput, Plan};
+use crate::runtime::{FrameSource, Frames, PcmOutput, Plan};
 
 /// Maximum size of the encoded output of one step for one thread: a share of the second-level cache.
 const STEP_BYTES: usize = 256 << 10;
@@ -136,7 +136,7 @@ impl<'a> Pipeline<'a> {
     }
 
     /// All frames of all parts, step by step.
-    fn run(&mut self, parts: &[&dyn InputFrames], write: Write<'_>) -> Result<(), PipelineError> {
+    fn run(&mut self, parts: &[&dyn FrameSource], write: Write<'_>) -> Result<(), PipelineError> {
         let frames = parts.first().map_or(0, |part| part.frames());
         let mut first = 0;
         while first < frames {
@@ -148,8 +148,8 @@ impl<'a> Pipeline<'a> {
         Ok(())
     }
 
-    fn step(&mut self, parts: &[impl InputFrames], write: Write<'_>) -> Result<(), PipelineError> {
-        let frames = parts.first().map_or(0, InputFrames::frames);
+    fn step(&mut self, parts: &[impl FrameSource], write: Write<'_>) -> Result<(), PipelineError> {
+        let frames = parts.first().map_or(0, FrameSource::frames);
         let mut output = room(&mut self.buffer, self.format, frames * self.fusion.outputs());
         let written = self.fusion.step(parts, usize::MAX, &mut output)?;
         self.clipped += output.clipped;

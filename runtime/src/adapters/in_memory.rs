@@ -1,6 +1,6 @@
 //! Samples in memory, frame after frame or channel after channel.
 
-use super::{Halves, InputFrames, MOST_ROWS, OutputFrames, SplitOutput, convert, interleave_rows};
+use super::{FrameSink, FrameSource, Halves, MOST_ROWS, SplitOutput, convert, interleave_rows};
 use crate::sample::{same, same_mut};
 use crate::{Isa, ProcessError, Sample};
 use std::ops::Range;
@@ -26,7 +26,7 @@ impl<'a, S: Sample> Interleaved<'a, S> {
     }
 }
 
-impl<S: Sample> InputFrames for Interleaved<'_, S> {
+impl<S: Sample> FrameSource for Interleaved<'_, S> {
     fn channels(&self) -> usize {
         self.channels
     }
@@ -57,7 +57,7 @@ impl<S: Sample> InputFrames for Interleaved<'_, S> {
     }
 }
 
-impl<S: Sample> OutputFrames for &mut [S] {
+impl<S: Sample> FrameSink for &mut [S] {
     fn capacity(&self) -> usize {
         self.len()
     }
@@ -123,7 +123,7 @@ impl<'a, S: Sample> Planar<'a, S> {
     }
 }
 
-impl<S: Sample> InputFrames for Planar<'_, S> {
+impl<S: Sample> FrameSource for Planar<'_, S> {
     fn channels(&self) -> usize {
         self.channels.len()
     }

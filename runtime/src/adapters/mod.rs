@@ -1,7 +1,7 @@
 //! Samples of a call, wherever and however they lie: to and from interleaved frames of the kernels' number
 //! type.
 //!
-//! A stream takes any [`InputFrames`] and gives to any [`OutputFrames`]; those here are [`Interleaved`] and
+//! A stream takes any [`FrameSource`] and gives to any [`FrameSink`]; those here are [`Interleaved`] and
 //! [`Planar`] samples in memory, recordings as they lie in files ([`PcmFrames`](crate::PcmFrames)),
 //! [`Zeros`], slices of samples and [`PcmOutput`](crate::PcmOutput). The kernels' blocks are converted one
 //! by one, so that no adapter needs memory of its own.
@@ -19,7 +19,7 @@ use crate::{Isa, Sample};
 use std::ops::Range;
 
 /// The input of a call: frames of N samples, one of each channel. The kernels ask for it block by block.
-pub trait InputFrames: Sync {
+pub trait FrameSource: Sync {
     /// N, samples per frame.
     fn channels(&self) -> usize;
 
@@ -31,7 +31,7 @@ pub trait InputFrames: Sync {
         None
     }
 
-    /// As [`InputFrames::in_memory_f32`].
+    /// As [`FrameSource::in_memory_f32`].
     fn in_memory_f64(&self) -> Option<&[f64]> {
         None
     }
@@ -46,12 +46,12 @@ pub trait InputFrames: Sync {
     /// conversions.
     fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]);
 
-    /// As [`InputFrames::load_f32`].
+    /// As [`FrameSource::load_f32`].
     fn load_f64(&self, isa: Isa, first: usize, samples: &mut [f64]);
 }
 
 /// Where the output of a call goes: samples at the fast rate, M for each frame of the input.
-pub trait OutputFrames: Send {
+pub trait FrameSink: Send {
     /// Samples that fit.
     fn capacity(&self) -> usize;
 
@@ -65,7 +65,7 @@ pub trait OutputFrames: Send {
         None
     }
 
-    /// As [`OutputFrames::slots_f32`].
+    /// As [`FrameSink::slots_f32`].
     fn slots_f64(&mut self, _samples: Range<usize>) -> Option<&mut [f64]> {
         None
     }
@@ -73,12 +73,12 @@ pub trait OutputFrames: Send {
     /// Stores samples from sample `first` on. `isa` is the instruction set for conversions.
     fn store_f32(&mut self, isa: Isa, first: usize, samples: &[f32]);
 
-    /// As [`OutputFrames::store_f32`].
+    /// As [`FrameSink::store_f32`].
     fn store_f64(&mut self, isa: Isa, first: usize, samples: &[f64]);
 }
 
 /// An output whose beginning and end may be written by two threads.
-pub trait SplitOutput: OutputFrames {
+pub trait SplitOutput: FrameSink {
     /// Calls `with` with the room for the first `samples` samples and that for all others.
     fn halves(&mut self, samples: usize, with: Halves<'_>);
 }
@@ -87,12 +87,12 @@ pub trait SplitOutput: OutputFrames {
 pub type Halves<'w> = &'w mut dyn FnMut(&mut dyn SplitOutput, &mut dyn SplitOutput);
 
 /// By number type.
-impl dyn InputFrames + '_ {
+impl dyn FrameSource + '_ {
     pub(crate) fn in_memory<T: Sample>(&self) -> Option<&[T]> {
         self.in_memory_f32().and_then(same).or_else(|| self.in_memory_f64().and_then(same))
     }
 
-    /// [`InputFrames::load_f32`] or [`InputFrames::load_f64`].
+    /// [`FrameSource::load_f32`] or [`FrameSource::load_f64`].
     pub fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
         if let Some(samples) = same_mut(samples) {
             return self.load_f32(isa, first, samples);
@@ -104,7 +104,7 @@ impl dyn InputFrames + '_ {
 }
 
 /// By number type.
-impl dyn OutputFrames + '_ {
+impl dyn FrameSink + '_ {
     pub(crate) fn slots<T: Sample>(&mut self, samples: Range<usize>) -> Option<&mut [T]> {
         if size_of::<T>() == 4 {
             self.slots_f32(samples).and_then(same_mut)
@@ -113,7 +113,7 @@ impl dyn OutputFrames + '_ {
         }
     }
 
-    /// [`OutputFrames::store_f32`] or [`OutputFrames::store_f64`].
+    /// [`FrameSink::store_f32`] or [`FrameSink::store_f64`].
     pub fn store<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]) {
         if let Some(samples) = same(samples) {
             self.store_f32(isa, first, samples);
@@ -143,7 +143,7 @@ pub struct Zeros {
     pub frames: usize,
 }
 
-impl InputFrames for Zeros {
+impl FrameSource for Zeros {
     fn channels(&self) -> usize {
         self.channels
     }
@@ -199,13 +199,13 @@ const MOST_ROWS: usize = SCRATCH / 8;
 /// The frames of a range of another input, where they lie.
 #[derive(Clone)]
 pub struct Frames<'a> {
-    input: &'a dyn InputFrames,
+    input: &'a dyn FrameSource,
     range: Range<usize>,
 }
 
 impl<'a> Frames<'a> {
     /// Frames `range` of `input`, as far as it has them.
-    pub fn new(input: &'a dyn InputFrames, range: Range<usize>) -> Self {
+    pub fn new(input: &'a dyn FrameSource, range: Range<usize>) -> Self {
         let end = range.end.min(input.frames());
         Self { input, range: range.start.min(end)..end }
     }
@@ -217,7 +217,7 @@ impl<'a> Frames<'a> {
     }
 }
 
-impl InputFrames for Frames<'_> {
+impl FrameSource for Frames<'_> {
     fn channels(&self) -> usize {
         self.input.channels()
     }

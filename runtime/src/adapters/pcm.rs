@@ -1,6 +1,6 @@
 //! Recordings as they lie in files and pipes.
 
-use super::{Halves, InputFrames, MOST_ROWS, OutputFrames, SCRATCH, SplitOutput, convert, interleave_rows};
+use super::{FrameSink, FrameSource, Halves, MOST_ROWS, SCRATCH, SplitOutput, convert, interleave_rows};
 use crate::pcm::for_pcm_format;
 use crate::simd::{decode, encode};
 use crate::{Isa, PcmFormat, PcmFrames, Sample, SampleLayout};
@@ -16,7 +16,7 @@ pub struct PcmOutput<'a> {
     pub bytes: &'a mut [u8],
     /// Samples that were clipped, added to by every call.
     pub clipped: u64,
-    /// The part of complex samples that is stored, see [`OutputFrames::select`].
+    /// The part of complex samples that is stored, see [`FrameSink::select`].
     part: Option<usize>,
 }
 
@@ -60,7 +60,7 @@ fn is_native<T: Sample>(layout: SampleLayout) -> bool {
 }
 
 /// Several recordings side by side: their channels follow each other.
-impl InputFrames for &[PcmFrames<'_>] {
+impl FrameSource for &[PcmFrames<'_>] {
     fn channels(&self) -> usize {
         self.iter().map(|recording| recording.channels).sum()
     }
@@ -144,7 +144,7 @@ fn load_columns<T: Sample>(recording: &PcmFrames<'_>, first: usize, n: usize, sa
     });
 }
 
-impl OutputFrames for PcmOutput<'_> {
+impl FrameSink for PcmOutput<'_> {
     fn capacity(&self) -> usize {
         let (layout, before) = self.selected();
         layout.containers(self.bytes.len().saturating_sub(before))

@@ -11,7 +11,7 @@
 mod tests;
 
 use super::filter::{AlgorithmFacts, Filter, check_finite, phase_taps};
-use crate::adapters::{InputFrames, OutputFrames};
+use crate::adapters::{FrameSink, FrameSource};
 use crate::aligned::Aligned;
 use crate::history::History;
 use crate::simd::{FirKernel, Polyphase, Replaced, Segment, Tiling, not_finite, replace_not_finite};
@@ -160,9 +160,9 @@ impl<T: Sample> Direct<T> {
     fn process_block(
         &self,
         state: &mut DirectState<T>,
-        input: &dyn InputFrames,
+        input: &dyn FrameSource,
         frames: Range<usize>,
-        output: &mut dyn OutputFrames,
+        output: &mut dyn FrameSink,
     ) -> u64 {
         let DirectState { history, output: block } = state;
         let (len, samples) = (frames.len(), frames.start * self.ratio..frames.end * self.ratio);
@@ -220,7 +220,7 @@ impl<T: Sample> Direct<T> {
     /// A state before frame `first` of `input`, as if all frames before it had been processed: at least
     /// [`Direct::history_frames`] of them.
     #[cfg(feature = "rayon")]
-    pub(crate) fn state_at(&self, input: &dyn InputFrames, first: usize) -> DirectState<T> {
+    pub(crate) fn state_at(&self, input: &dyn FrameSource, first: usize) -> DirectState<T> {
         let mut samples = vec![T::default(); self.history_frames * self.channels];
         input.load(self.isa, first - self.history_frames, &mut samples);
         // They are counted where they are processed.
@@ -260,8 +260,8 @@ impl<T: Sample> Filter for Direct<T> {
     fn process(
         &self,
         state: &mut DirectState<T>,
-        input: &dyn InputFrames,
-        output: &mut dyn OutputFrames,
+        input: &dyn FrameSource,
+        output: &mut dyn FrameSink,
     ) -> u64 {
         let frames = input.frames();
         if let (Some(head), Some(samples)) = (self.head(frames), input.in_memory())

@@ -1,6 +1,6 @@
 //! What all algorithms have in common.
 
-use crate::adapters::{InputFrames, OutputFrames};
+use crate::adapters::{FrameSink, FrameSource};
 use crate::state::{Count, StateNumbers};
 use crate::{BuildError, Sample};
 use std::fmt::Debug;
@@ -21,8 +21,7 @@ pub(crate) trait Filter: Debug + Send + Sync {
 
     /// Filters all frames of the input; returns how many samples were not finite and were taken as 0. Does
     /// not allocate.
-    fn process(&self, state: &mut Self::State, input: &dyn InputFrames, output: &mut dyn OutputFrames)
-    -> u64;
+    fn process(&self, state: &mut Self::State, input: &dyn FrameSource, output: &mut dyn FrameSink) -> u64;
 
     /// How many numbers make up a state `place` frames after a multiple of the alignment.
     fn count(&self, place: usize) -> Count;

@@ -2,8 +2,8 @@
 //! of the samples.
 
 use hybank_runtime::{
-    Algorithm, InputFrames, Interleaved, Options, OutputFrames, PcmFormat, PcmFrames, PcmOutput, Plan,
-    Planar, Precision, SampleLayout, Shape, StateMatrices, Stream, Zeros,
+    Algorithm, FrameSink, FrameSource, Interleaved, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Planar,
+    Precision, SampleLayout, Shape, StateMatrices, Stream, Zeros,
 };
 
 const N: usize = 2;
@@ -52,7 +52,7 @@ fn quiet<R>(plan: &Plan, form: &str, call: impl FnOnce() -> R) -> R {
 }
 
 /// An input and an output through [`Stream::run`].
-fn quiet_run(stream: &mut Stream, form: &str, input: &dyn InputFrames, output: &mut dyn OutputFrames) {
+fn quiet_run(stream: &mut Stream, form: &str, input: &dyn FrameSource, output: &mut dyn FrameSink) {
     let plan = stream.plan().clone();
     let wanted = input.frames() * M;
     assert_eq!(quiet(&plan, form, || stream.run(input, output)), Ok(wanted), "{form}");

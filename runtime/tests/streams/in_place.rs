@@ -1,8 +1,6 @@
 //! Packed floats of this machine's byte order are read and written where they lie; all others are converted.
 
-use hybank_runtime::{
-    InputFrames, Isa, OutputFrames, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout,
-};
+use hybank_runtime::{FrameSink, FrameSource, Isa, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout};
 
 const NATIVE: PcmFormat = PcmFormat::F32Le.native();
 const FOREIGN: PcmFormat = if cfg!(target_endian = "big") { PcmFormat::F32Le } else { PcmFormat::F32Be };

@@ -5,7 +5,7 @@ use crate::calibrate::{
     CalibrateError, Calibration, CalibrationSettings, CalibrationSignal, FittedValues, Record, calibrate,
 };
 use crate::random::Random;
-use crate::simulate::{Instants, PeriodicRecording};
+use crate::simulate::{Instants, Periodic};
 use crate::spec::Spec;
 use crate::units::FastPeriods;
 use std::f64::consts::PI;
@@ -40,7 +40,7 @@ fn band_limited(samples: usize, band: f64, dice: &mut Random) -> Vec<f64> {
 
 /// The captures of `truth`, with noise relative to the signal.
 fn captures(truth: &Spec, signal: &[f64], frames: usize, noise: f64, dice: &mut Random) -> Vec<Record> {
-    let recording = PeriodicRecording::new(signal, FastPeriods(1.0));
+    let recording = Periodic::new(signal, FastPeriods(1.0));
     let one = |channel: &crate::spec::ChannelSpec| {
         let filter = crate::analog::StrictlyProper::new(&channel.filter, truth.fast_period).unwrap();
         // From the middle of the periodic signal, so that the record itself is not periodic.

@@ -21,7 +21,7 @@ const SPACING: FastPeriods = FastPeriods(1.0 / 1.5);
 
 /// Captures of the waveform, which begins at `start` (fast periods).
 fn captures(truth: &Spec, samples: &[f64], start: f64, noise: f64, dice: &mut Random) -> Vec<Record> {
-    let recording = PeriodicRecording::new(samples, SPACING);
+    let recording = Periodic::new(samples, SPACING);
     let ratio = truth.ratio as f64;
     let count = (recording.duration().0 / ratio) as usize + 60;
     let one = |channel: &ChannelSpec| {

@@ -3,7 +3,7 @@
 //! Integers that fit few bits fit more bits, so the least loss of all integers falls with the bits, and so
 //! does the number of taps that can stay: both are found by bisection.
 
-use super::problem::IntegerCandidate;
+use super::problem::RoundedTaps;
 use super::quantiser::TapQuantiser;
 use super::{NEIGHBOURS, QuantisationProblem, WordChoice, WordStudy};
 use crate::bank::FixedPoint;
@@ -54,7 +54,7 @@ pub(in crate::design) fn quantise_within(
 fn fewest_bits(
     quantiser: &TapQuantiser<'_>,
     Allowance { loss_db, most }: &Allowance,
-) -> Result<IntegerCandidate, DesignError> {
+) -> Result<RoundedTaps, DesignError> {
     let longest = quantiser.quantise(most, None)?;
     if !quantiser.keeps(&longest) {
         let best = quantiser.mean_square_loss_db(&longest);
@@ -66,10 +66,7 @@ fn fewest_bits(
 
 /// The same bits with as many taps left out as the loss allows: those whose integers matter least, and the
 /// others chosen again.
-fn leave_out(
-    quantiser: &TapQuantiser<'_>,
-    found: &IntegerCandidate,
-) -> Result<IntegerCandidate, DesignError> {
+fn leave_out(quantiser: &TapQuantiser<'_>, found: &RoundedTaps) -> Result<RoundedTaps, DesignError> {
     let FixedPoint { bits, integers, .. } = &found.fixed_point;
     let powers = quantiser.error.powers();
     let size = |n: usize| -> f64 {
@@ -88,10 +85,10 @@ fn leave_out(
 /// integers of the first, keeps to it. When the design is stopped, the last that were found.
 fn last_that_keeps(
     quantiser: &TapQuantiser<'_>,
-    first: IntegerCandidate,
+    first: RoundedTaps,
     mut open: Range<usize>,
     lengths: impl Fn(usize) -> WordLengths,
-) -> Result<IntegerCandidate, DesignError> {
+) -> Result<RoundedTaps, DesignError> {
     let mut best = first;
     while open.len() > 1 && !quantiser.error.problem.stop.is_due() {
         let middle = open.start + open.len() / 2;

@@ -25,7 +25,7 @@ pub(super) use problem::QuantisationProblem;
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::spec::WordLengths;
-use problem::IntegerCandidate;
+use problem::RoundedTaps;
 use quantiser::TapQuantiser;
 
 /// Word lengths of a study, relative to the requested one.
@@ -105,7 +105,7 @@ pub(super) fn quantise(
     for k in 1..found.len() {
         if found[k - 1].is_better(&found[k], problem.gamma_margin) {
             let fixed_point = FixedPoint { bits: all[k].clone(), ..found[k - 1].fixed_point.clone() };
-            found[k] = IntegerCandidate { fixed_point, ..found[k - 1] };
+            found[k] = RoundedTaps { fixed_point, ..found[k - 1] };
         }
     }
     let loss = |found| quantiser.loss(found, fraction_bits);

@@ -35,7 +35,7 @@ pub(in crate::design) struct QuantisationProblem<'a> {
 
 /// Integer taps with their error.
 #[derive(Debug, Clone)]
-pub(super) struct IntegerCandidate {
+pub(super) struct RoundedTaps {
     /// The integers with their scale.
     pub(super) fixed_point: FixedPoint,
     /// Estimate of gamma on the grid.
@@ -62,7 +62,7 @@ pub(super) struct TapError<'a> {
     pub(super) real_gamma: f64,
     /// The least gamma that counts.
     pub(super) least_gamma: f64,
-    /// Mean square of the real taps, as in [`IntegerCandidate`].
+    /// Mean square of the real taps, as in [`RoundedTaps`].
     pub(super) real_mean_square: f64,
     /// The least mean square that counts.
     least_mean_square: f64,
@@ -99,12 +99,12 @@ impl<'a> TapError<'a> {
     }
 
     /// The error of integer taps.
-    pub(super) fn candidate(&self, fixed_point: FixedPoint) -> Result<IntegerCandidate, DesignError> {
+    pub(super) fn candidate(&self, fixed_point: FixedPoint) -> Result<RoundedTaps, DesignError> {
         let taps = fixed_point.taps();
         let lags = polyphase(&taps, self.ratio);
         let found = self.grid.mean_square(&lags) + output_noise(self.problem.noise, &taps);
         let mean_square = found.max(self.least_mean_square);
-        Ok(IntegerCandidate { gamma: self.grid.gamma(&lags)?, mean_square, fixed_point })
+        Ok(RoundedTaps { gamma: self.grid.gamma(&lags)?, mean_square, fixed_point })
     }
 
     /// The mean square that a unit of each channel's tap adds.

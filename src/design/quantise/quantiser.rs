@@ -1,7 +1,7 @@
 //! The search at the two scales in question, and the choice among its candidates.
 
 use super::lattice::IntegerSpan;
-use super::problem::{IntegerCandidate, QuantisationProblem, TapError};
+use super::problem::{QuantisationProblem, RoundedTaps, TapError};
 use super::search::LatticeSearch;
 use super::{WordLoss, decades};
 use crate::bank::FixedPoint;
@@ -16,7 +16,7 @@ const LEAST_EFFECT_OF_INTEGERS: f64 = 1e-6;
 /// Real taps that lower it by more than this share have an effect, which integers should have too.
 const LEAST_EFFECT_OF_REAL_TAPS: f64 = 1e-3;
 
-impl IntegerCandidate {
+impl RoundedTaps {
     /// Whether gamma is smaller, or about equal with a smaller mean square.
     pub(super) fn is_better(&self, other: &Self, gamma_margin: f64) -> bool {
         let alike = 1.0 + gamma_margin.max(GAMMA_TIE);
@@ -62,7 +62,7 @@ impl<'a> TapQuantiser<'a> {
         &self,
         bits: &WordLengths,
         fraction_bits: Option<i32>,
-    ) -> Result<IntegerCandidate, DesignError> {
+    ) -> Result<RoundedTaps, DesignError> {
         let finest = fraction_bits.unwrap_or_else(|| self.finest_that_fits(bits));
         let mut found = self.candidates(bits, finest)?;
         if fraction_bits.is_none() && finest < MAX_FRACTION_BITS {
@@ -73,11 +73,7 @@ impl<'a> TapQuantiser<'a> {
         Ok(self.best(found, zero_output.gamma).unwrap_or(zero_output))
     }
 
-    fn candidates(
-        &self,
-        bits: &WordLengths,
-        fraction_bits: i32,
-    ) -> Result<Vec<IntegerCandidate>, DesignError> {
+    fn candidates(&self, bits: &WordLengths, fraction_bits: i32) -> Result<Vec<RoundedTaps>, DesignError> {
         let search = LatticeSearch::new(&self.error, bits, fraction_bits);
         let mut found = search.run()?;
         if let Some(taps) = &self.of_least_square {
@@ -88,7 +84,7 @@ impl<'a> TapQuantiser<'a> {
 
     /// The candidate of least mean square: of those of about the least gamma, which is not above that of
     /// zero output, that keep to the mean square that is allowed, or of all where none does.
-    fn best(&self, mut found: Vec<IntegerCandidate>, of_zero_output: f64) -> Option<IntegerCandidate> {
+    fn best(&self, mut found: Vec<RoundedTaps>, of_zero_output: f64) -> Option<RoundedTaps> {
         if found.iter().any(|found| self.keeps(found)) {
             found.retain(|found| self.keeps(found));
             let least = found.iter().map(|found| found.gamma).fold(f64::INFINITY, f64::min);
@@ -104,7 +100,7 @@ impl<'a> TapQuantiser<'a> {
         &self,
         all: &[WordLengths],
         fraction_bits: Option<i32>,
-    ) -> Result<Vec<IntegerCandidate>, DesignError> {
+    ) -> Result<Vec<RoundedTaps>, DesignError> {
         let found: Vec<_> = all.par_iter().map(|bits| self.quantise(bits, fraction_bits)).collect();
         found.into_iter().collect()
     }
@@ -113,7 +109,7 @@ impl<'a> TapQuantiser<'a> {
     ///
     /// # Errors
     /// [`DesignError::Linalg`] if a decomposition fails.
-    pub(super) fn does_nothing(&self, found: &IntegerCandidate) -> Result<bool, DesignError> {
+    pub(super) fn does_nothing(&self, found: &RoundedTaps) -> Result<bool, DesignError> {
         let fixed_point = &found.fixed_point;
         let zeros = fixed_point.integers.iter().map(|list| vec![0; list.len()]).collect();
         let zero_output = self.error.gamma(&FixedPoint { integers: zeros, ..fixed_point.clone() })?;
@@ -122,7 +118,7 @@ impl<'a> TapQuantiser<'a> {
     }
 
     /// Whether the mean square is as small as it should be.
-    pub(super) fn keeps(&self, found: &IntegerCandidate) -> bool {
+    pub(super) fn keeps(&self, found: &RoundedTaps) -> bool {
         found.mean_square <= self.most_mean_square
     }
 
@@ -132,7 +128,7 @@ impl<'a> TapQuantiser<'a> {
     /// [`DesignError::Linalg`] if a decomposition fails.
     pub(super) fn loss(
         &self,
-        found: &IntegerCandidate,
+        found: &RoundedTaps,
         fraction_bits: Option<i32>,
     ) -> Result<WordLoss, DesignError> {
         let bits = found.fixed_point.bits.clone();
@@ -150,7 +146,7 @@ impl<'a> TapQuantiser<'a> {
         20.0 * decades(gamma.max(least_gamma), real_gamma.max(least_gamma))
     }
 
-    pub(super) fn mean_square_loss_db(&self, found: &IntegerCandidate) -> f64 {
+    pub(super) fn mean_square_loss_db(&self, found: &RoundedTaps) -> f64 {
         10.0 * decades(found.mean_square, self.error.real_mean_square)
     }
 

@@ -2,7 +2,7 @@
 
 use super::descent::Descent;
 use super::lattice::{IntegerSpan, closest};
-use super::problem::{IntegerCandidate, Tap, TapError};
+use super::problem::{RoundedTaps, Tap, TapError};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::design::filters::polyphase;
@@ -38,7 +38,7 @@ impl<'a> LatticeSearch<'a> {
 
     /// All candidates: zero output, the rounded taps, those of the rounds of reweighting, and the end of a
     /// descent from the best of these.
-    pub(super) fn run(&self) -> Result<Vec<IntegerCandidate>, DesignError> {
+    pub(super) fn run(&self) -> Result<Vec<RoundedTaps>, DesignError> {
         let mut found =
             vec![self.error.candidate(self.zero_output())?, self.error.candidate(self.rounded())?];
         self.reweighted(&mut found)?;
@@ -50,7 +50,7 @@ impl<'a> LatticeSearch<'a> {
 
     /// The candidate close to the real `taps` of least mean square, in which the noise of the converters
     /// counts.
-    pub(super) fn near_least_square(&self, taps: &[Vec<f64>]) -> Result<IntegerCandidate, DesignError> {
+    pub(super) fn near_least_square(&self, taps: &[Vec<f64>]) -> Result<RoundedTaps, DesignError> {
         let centre = in_steps(taps, self.fraction_bits);
         let closest = self.closest(&centre, &self.error.grid.mean_weights(), self.error.problem.noise)?;
         self.error.candidate(self.fixed_point(&closest))
@@ -80,7 +80,7 @@ impl<'a> LatticeSearch<'a> {
 
     /// Closest lattice points, with weights that grow at the frequencies where the last point was worst
     /// (Lawson).
-    fn reweighted(&self, found: &mut Vec<IntegerCandidate>) -> Result<(), DesignError> {
+    fn reweighted(&self, found: &mut Vec<RoundedTaps>) -> Result<(), DesignError> {
         let real = self.error.real_gamma;
         let mut weights = vec![1.0; self.error.points.len()];
         for _ in (0..ROUNDS).take_while(|_| !self.error.problem.stop.is_due()) {

@@ -13,7 +13,7 @@
 use super::basis::Basis;
 use super::prepare::ReducedProblem;
 use super::problem::{FrequencyPoint, SampledProblem, Taps};
-use crate::linalg::blocks::MatrixBlocks;
+use crate::linalg::blocks::Batch;
 use crate::linalg::{self, CMat, Complex, LinalgError, Mat};
 
 /// Thresholds tried between weak directions of tap space and rounding errors; the best bound counts.
@@ -131,7 +131,7 @@ pub(super) fn from_iterate(
     problem: &SampledProblem,
     reduced: &ReducedProblem,
     basis: &Basis,
-    z: &MatrixBlocks,
+    z: &Batch,
     coverage: Coverage,
 ) -> Result<LowerBound, LinalgError> {
     let mut value = 0.0;
@@ -142,15 +142,15 @@ pub(super) fn from_iterate(
     Ok(LowerBound { value, covers_all: coverage.is_all })
 }
 
-fn dual_matrices(reduced: &ReducedProblem, basis: &Basis, z: &MatrixBlocks, cut: f64) -> Vec<CMat> {
+fn dual_matrices(reduced: &ReducedProblem, basis: &Basis, z: &Batch, cut: f64) -> Vec<CMat> {
     let (m, k1, k2) = (reduced.layout.rows, reduced.h.cols(), reduced.w_rest.cols());
-    let mut image = MatrixBlocks::zeros(z.count(), m, k1);
+    let mut image = Batch::zeros(z.count(), m, k1);
     for l in 0..z.count() {
         let (from, to) = (z.block(l), image.block_mut(l).data);
         (0..m * k1).for_each(|e| to[e] = -from.at(e % m, m + e / m));
     }
     basis.project_out(reduced, &mut image, cut);
-    let mut rest = MatrixBlocks::zeros(1, m, k2);
+    let mut rest = Batch::zeros(1, m, k2);
     let full = |l: usize| {
         let weight = z.block(l).part(0, 0, m, m);
         rest.block_mut(0).set_product(1.0, weight.plain(), reduced.w_rest.block(l).plain());

@@ -1,6 +1,6 @@
 //! Sums over the points with the phases of the lags, as real matrix products.
 
-use crate::linalg::blocks::MatrixBlocks;
+use crate::linalg::blocks::Batch;
 use crate::linalg::{Complex, Mat};
 
 /// Cosines (rows 0..L) and sines (rows L..2L) of `omega_l k`, k = 0 .. 2J-2.
@@ -46,7 +46,7 @@ impl LagPhasors {
     }
 
     /// `Re sum_l e^{+i omega_l k} e_l` for every entry of the blocks, as an (entries x lags) matrix.
-    pub(super) fn adjoint_sum(&self, e: &MatrixBlocks) -> Mat {
+    pub(super) fn adjoint_sum(&self, e: &Batch) -> Mat {
         let size = e.rows() * e.cols();
         let entry = |r: usize, l: usize| e.as_slice()[l * size + r];
         let data = Mat::from_fn(size, 2 * self.count, |r, c| {
@@ -56,7 +56,7 @@ impl LagPhasors {
     }
 
     /// `out_l = sum_k e^{-i omega_l k} coefficients[:, k]`, entry by entry.
-    pub(super) fn response(&self, coefficients: &Mat, out: &mut MatrixBlocks) {
+    pub(super) fn response(&self, coefficients: &Mat, out: &mut Batch) {
         let size = out.rows() * out.cols();
         let values = coefficients * self.table.columns(0, self.lags).transpose();
         for l in 0..self.count {

@@ -9,7 +9,7 @@ use super::newton::{self, ChannelProjection};
 use super::prepare::ReducedProblem;
 use super::quadratic::Quadratic;
 use crate::linalg::Mat;
-use crate::linalg::blocks::MatrixBlocks;
+use crate::linalg::blocks::Batch;
 use crate::lmi::IsDue;
 use crate::lmi::factor::RegularisedCholesky;
 use crate::lmi::iteration::{self, StepLengths, centering};
@@ -93,9 +93,9 @@ impl<'a> InteriorIterate<'a> {
     }
 
     /// `A*(Y)`: derivative of `sum <S_l, Y_l>` in the unknowns.
-    fn adjoint(&self, y: &MatrixBlocks) -> Vec<f64> {
+    fn adjoint(&self, y: &Batch) -> Vec<f64> {
         let (m, k1) = (self.cone.m, self.cone.k1);
-        let mut off = MatrixBlocks::zeros(y.count(), m, k1);
+        let mut off = Batch::zeros(y.count(), m, k1);
         for l in 0..y.count() {
             let block = y.block(l);
             let to = off.block_mut(l).data;
@@ -170,14 +170,14 @@ impl<'a> InteriorIterate<'a> {
 
     /// Step lengths to the boundary. With a quadratic objective the dual residual moves with the taps, so
     /// both take the shorter one.
-    fn max_steps(&mut self, d: &NewtonDirection, dz: &MatrixBlocks, most: f64) -> StepLengths {
+    fn max_steps(&mut self, d: &NewtonDirection, dz: &Batch, most: f64) -> StepLengths {
         let primal = self.cone.max_primal_step(&d.slack, most);
         let dual = self.cone.max_dual_step(dz, most);
         let both = primal.min(dual);
         if self.free_t() { StepLengths { primal, dual } } else { StepLengths { primal: both, dual: both } }
     }
 
-    fn gap_after(&self, gap: f64, d: &NewtonDirection, dz: &MatrixBlocks, length: StepLengths) -> f64 {
+    fn gap_after(&self, gap: f64, d: &NewtonDirection, dz: &Batch, length: StepLengths) -> f64 {
         // <S, dZ> = <S, Z + dZ> - <S, Z>, and S itself is linear in (t, K) up to its constant part.
         let slack_dz = self.cone.inner_slack(dz);
         gap + length.primal * self.cone.inner(&d.slack, &self.cone.z)
@@ -185,7 +185,7 @@ impl<'a> InteriorIterate<'a> {
             + length.primal * length.dual * self.cone.inner(&d.slack, dz)
     }
 
-    fn advance(&mut self, d: &NewtonDirection, dz: &MatrixBlocks, length: StepLengths) -> Option<()> {
+    fn advance(&mut self, d: &NewtonDirection, dz: &Batch, length: StepLengths) -> Option<()> {
         let finite = d.taps.iter().all(|v| v.is_finite()) && d.slack.t.is_finite();
         if !finite || !length.make_progress() {
             return None;

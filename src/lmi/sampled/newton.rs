@@ -10,23 +10,23 @@
 
 use super::fourier::{LagPhasors, TapLayout};
 use super::prepare::ReducedProblem;
-use crate::linalg::blocks::{MatrixBlock, MatrixBlocks, inner};
+use crate::linalg::blocks::{Batch, BatchView, inner};
 use crate::linalg::{Complex, Mat};
 
 /// A family of Hermitian matrices, projected on the rows (u) and channels (v).
 #[derive(Debug, Clone)]
 pub(super) struct ChannelProjection {
-    pub(super) uu: MatrixBlocks,
-    pub(super) vu: MatrixBlocks,
-    pub(super) vv: MatrixBlocks,
+    pub(super) uu: Batch,
+    pub(super) vu: Batch,
+    pub(super) vv: Batch,
 }
 
 impl ChannelProjection {
     /// Projects the blocks `x` of order m + k through the channels `h` (n x k).
-    pub(super) fn new(x: &MatrixBlocks, h: &MatrixBlocks) -> Self {
+    pub(super) fn new(x: &Batch, h: &Batch) -> Self {
         let (count, n, k, m) = (x.count(), h.rows(), h.cols(), x.rows() - h.cols());
-        let (mut uu, mut vu) = (MatrixBlocks::zeros(count, m, m), MatrixBlocks::zeros(count, n, m));
-        let (mut vv, mut half) = (MatrixBlocks::zeros(count, n, n), MatrixBlocks::zeros(1, n, k));
+        let (mut uu, mut vu) = (Batch::zeros(count, m, m), Batch::zeros(count, n, m));
+        let (mut vv, mut half) = (Batch::zeros(count, n, n), Batch::zeros(1, n, k));
         for l in 0..count {
             let (full, h) = (x.block(l), h.block(l));
             copy(full.part(0, 0, m, m), uu.block_mut(l).data);
@@ -38,7 +38,7 @@ impl ChannelProjection {
     }
 }
 
-fn copy(from: MatrixBlock<'_>, to: &mut [Complex<f64>]) {
+fn copy(from: BatchView<'_>, to: &mut [Complex<f64>]) {
     for j in 0..from.cols {
         for i in 0..from.rows {
             to[i + j * from.rows] = from.at(i, j);
@@ -79,9 +79,9 @@ pub(super) fn add_taps(
 }
 
 struct ProjectionAt<'a> {
-    uu: MatrixBlock<'a>,
-    vu: MatrixBlock<'a>,
-    vv: MatrixBlock<'a>,
+    uu: BatchView<'a>,
+    vu: BatchView<'a>,
+    vv: BatchView<'a>,
 }
 
 impl<'a> ProjectionAt<'a> {
@@ -103,8 +103,8 @@ pub(super) fn border(
     z: &ChannelProjection,
 ) -> (Vec<f64>, f64) {
     let (n, m) = (reduced.layout.channels, reduced.layout.rows);
-    let mut mixed = MatrixBlocks::zeros(1, n, m);
-    let mut e = MatrixBlocks::zeros(reduced.count(), m, n);
+    let mut mixed = Batch::zeros(1, n, m);
+    let mut e = Batch::zeros(reduced.count(), m, n);
     let mut corner = 0.0;
     for l in 0..reduced.count() {
         let (xl, zl) = (ProjectionAt::new(x, l), ProjectionAt::new(z, l));
@@ -123,11 +123,11 @@ pub(super) fn add_mean_square(
     matrix: &mut Mat,
     layout: &TapLayout,
     phases: &LagPhasors,
-    h: &MatrixBlocks,
+    h: &Batch,
     weights: &[f64],
 ) {
     let (n, count) = (layout.channels, h.count());
-    let mut gram = MatrixBlocks::zeros(1, n, n);
+    let mut gram = Batch::zeros(1, n, n);
     let mut data = Mat::zeros(n * n, 2 * count);
     for (l, weight) in weights.iter().enumerate() {
         gram.block_mut(0).set_product(2.0 * weight, h.block(l).plain(), h.block(l).adjoint());

@@ -3,7 +3,7 @@
 
 use super::fourier::{LagPhasors, TapLayout};
 use super::problem::{SampledProblem, Taps};
-use crate::linalg::blocks::MatrixBlocks;
+use crate::linalg::blocks::Batch;
 use crate::linalg::{self, CMat, LinalgError, Mat};
 
 /// Singular values of the row-normalised channels below this are rounding errors; their directions are
@@ -14,13 +14,13 @@ const CHANNEL_RANK: f64 = 1e-14;
 #[derive(Debug, Clone)]
 pub(super) struct ReducedProblem {
     /// Mixed channels, n x k1.
-    pub(super) h: MatrixBlocks,
+    pub(super) h: Batch,
     /// The reference in the inputs that the channels measure, M x k1.
-    pub(super) w: MatrixBlocks,
+    pub(super) w: Batch,
     /// The reference in the other inputs, M x k2; the taps do not act on it.
-    pub(super) w_rest: MatrixBlocks,
+    pub(super) w_rest: Batch,
     /// `w_rest w_rest*`, M x M.
-    pub(super) g: MatrixBlocks,
+    pub(super) g: Batch,
     /// Orthonormal rows (k1 + k2) x q at each point: the original inputs of the compressed ones.
     pub(super) inputs: Vec<CMat>,
     /// n x N: `H_l Q_l* = ` original channels, mixed by `mix`; taps = reduced taps times `mix`.
@@ -34,9 +34,9 @@ impl ReducedProblem {
         let (m, n, q) = (problem.rows(), problem.channels(), problem.inputs());
         let count = problem.points().len();
         let (k1, k) = (n.min(q), (m + n).min(q));
-        let mut channels = MatrixBlocks::zeros(count, n, k1);
-        let mut w = MatrixBlocks::zeros(count, m, k1);
-        let mut w_rest = MatrixBlocks::zeros(count, m, k - k1);
+        let mut channels = Batch::zeros(count, n, k1);
+        let mut w = Batch::zeros(count, m, k1);
+        let mut w_rest = Batch::zeros(count, m, k - k1);
         let mut inputs = Vec::with_capacity(count);
         for (l, point) in problem.points().iter().enumerate() {
             let (lower, basis) = linalg::lq(&stack(&point.h, &point.w));
@@ -59,17 +59,17 @@ impl ReducedProblem {
     }
 
     /// `k_l = w_l - F(omega_l) h_l` for the unknowns `x`.
-    pub(super) fn error(&self, x: &[f64]) -> MatrixBlocks {
+    pub(super) fn error(&self, x: &[f64]) -> Batch {
         let mut k = self.w.clone();
         k.add_scaled(-1.0, &self.image(x));
         k
     }
 
     /// `F(omega_l) h_l` for the unknowns `x`.
-    pub(super) fn image(&self, x: &[f64]) -> MatrixBlocks {
-        let mut f = MatrixBlocks::zeros(self.count(), self.layout.rows, self.layout.channels);
+    pub(super) fn image(&self, x: &[f64]) -> Batch {
+        let mut f = Batch::zeros(self.count(), self.layout.rows, self.layout.channels);
         self.phases.response(&self.layout.scatter(x), &mut f);
-        let mut image = MatrixBlocks::zeros(self.count(), self.layout.rows, self.h.cols());
+        let mut image = Batch::zeros(self.count(), self.layout.rows, self.h.cols());
         for l in 0..self.count() {
             image.block_mut(l).set_product(1.0, f.block(l).plain(), self.h.block(l).plain());
         }
@@ -78,8 +78,8 @@ impl ReducedProblem {
 
     /// `2 Re sum_l e^{i omega_l j} (y_l h_l*)_{p,i}` for all unknowns: the adjoint of
     /// [`ReducedProblem::image`] for the inner product `2 Re sum tr(y* k)`.
-    pub(super) fn adjoint(&self, y: &MatrixBlocks) -> Vec<f64> {
-        let mut e = MatrixBlocks::zeros(self.count(), self.layout.rows, self.layout.channels);
+    pub(super) fn adjoint(&self, y: &Batch) -> Vec<f64> {
+        let mut e = Batch::zeros(self.count(), self.layout.rows, self.layout.channels);
         for l in 0..self.count() {
             e.block_mut(l).set_product(2.0, y.block(l).plain(), self.h.block(l).adjoint());
         }
@@ -114,7 +114,7 @@ fn stack(h: &CMat, w: &CMat) -> CMat {
 
 /// n x N real matrix after which the channels, summed over all points, have unit mean power each and
 /// no correlation. Equal channels become one, zero channels none.
-fn mixing(channels: &MatrixBlocks) -> Result<Mat, LinalgError> {
+fn mixing(channels: &Batch) -> Result<Mat, LinalgError> {
     let (n, k, count) = (channels.rows(), channels.cols(), channels.count());
     let half = k * count;
     let mut all = Mat::from_fn(n, 2 * half, |i, c| {
@@ -130,17 +130,17 @@ fn mixing(channels: &MatrixBlocks) -> Result<Mat, LinalgError> {
     Ok(Mat::from_fn(rank, n, |r, i| power / svd.s[r] * svd.u[(i, r)] * unit[i]))
 }
 
-fn mixed(channels: &MatrixBlocks, mix: &Mat) -> MatrixBlocks {
+fn mixed(channels: &Batch, mix: &Mat) -> Batch {
     let mix = linalg::to_complex(mix);
-    let mut h = MatrixBlocks::zeros(channels.count(), mix.nrows(), channels.cols());
+    let mut h = Batch::zeros(channels.count(), mix.nrows(), channels.cols());
     for l in 0..channels.count() {
         h.set(l, &(&mix * channels.to_matrix(l)));
     }
     h
 }
 
-fn gram(a: &MatrixBlocks) -> MatrixBlocks {
-    let mut g = MatrixBlocks::zeros(a.count(), a.rows(), a.rows());
+fn gram(a: &Batch) -> Batch {
+    let mut g = Batch::zeros(a.count(), a.rows(), a.rows());
     for l in 0..a.count() {
         g.block_mut(l).set_product(1.0, a.block(l).plain(), a.block(l).adjoint());
     }

@@ -8,7 +8,7 @@ use super::newton;
 use super::prepare::ReducedProblem;
 use super::problem::{MeanSquareObjective, Taps};
 use crate::linalg::Mat;
-use crate::linalg::blocks::MatrixBlocks;
+use crate::linalg::blocks::Batch;
 
 /// See the module's text.
 #[derive(Debug, Clone)]
@@ -48,7 +48,7 @@ impl Quadratic {
     }
 
     /// The objective at the unknowns `x`, whose errors are `k`.
-    pub(super) fn value(&self, k: &MatrixBlocks, x: &[f64]) -> f64 {
+    pub(super) fn value(&self, k: &Batch, x: &[f64]) -> f64 {
         let square = |l: usize| k.block(l).data.iter().map(|z| z.norm_sqr()).sum::<f64>();
         let errors: f64 = self.weights.iter().enumerate().map(|(l, w)| w * square(l)).sum();
         let (bent, straight) = self.noise_slope(x);
@@ -57,7 +57,7 @@ impl Quadratic {
     }
 
     /// Its derivative in the unknowns.
-    pub(super) fn gradient(&self, reduced: &ReducedProblem, k: &MatrixBlocks, x: &[f64]) -> Vec<f64> {
+    pub(super) fn gradient(&self, reduced: &ReducedProblem, k: &Batch, x: &[f64]) -> Vec<f64> {
         let mut weighted = k.clone();
         let size = weighted.rows() * weighted.cols();
         for (i, z) in weighted.as_mut_slice().iter_mut().enumerate() {

@@ -118,7 +118,7 @@ fn complex_samples_with_gaps_have_the_bits_and_gaps_of_the_command() {
     let settings = Settings { gaps: Some(mean()), ..Settings::default() };
     let (want, outcome) = command(&bank, &plan, &[recording], settings.clone(), (PcmFormat::F32Le, true));
     let (real, imaginary) = ([recording.part(0)], [recording.part(1)]);
-    let parts: [&dyn InputFrames; 2] = [&real.as_slice(), &imaginary.as_slice()];
+    let parts: [&dyn FrameSource; 2] = [&real.as_slice(), &imaginary.as_slice()];
     let mut bytes = vec![0; want.samples.len()];
     let mut output = PcmOutput::packed(PcmFormat::F32Le, &mut bytes);
     let whole = fuse(&bank, &plan, &parts, &mut output, settings, NEVER).unwrap();

@@ -21,7 +21,7 @@ mod tests;
 pub(crate) use shape::TransformShape;
 
 use super::filter::{AlgorithmFacts, Filter, check_finite};
-use crate::adapters::{InputFrames, OutputFrames};
+use crate::adapters::{FrameSink, FrameSource};
 use crate::simd::{Lanes, Product, Row, group_lanes, multiply, replace_not_finite};
 use crate::state::{Count, StateNumbers};
 use crate::{BuildError, Isa, Sample};
@@ -146,8 +146,8 @@ impl<T: Sample> Filter for OverlapSave<T> {
     fn process(
         &self,
         state: &mut OverlapSaveState<T>,
-        input: &dyn InputFrames,
-        output: &mut dyn OutputFrames,
+        input: &dyn FrameSource,
+        output: &mut dyn FrameSink,
     ) -> u64 {
         let TransformShape { channels: n, ratio: m, history, .. } = self.shape;
         let (mut replaced, mut first) = (0, 0);

@@ -17,7 +17,7 @@ mod tests;
 pub use self::delay_lines::{DelayLines, DelayedInput};
 use self::layout::HistoryLayout;
 use super::filter::{AlgorithmFacts, Filter};
-use crate::adapters::{InputFrames, OutputFrames};
+use crate::adapters::{FrameSink, FrameSource};
 use crate::aligned::Aligned;
 use crate::history::History;
 use crate::simd::{
@@ -169,8 +169,8 @@ impl Filter for Recursive {
     fn process(
         &self,
         state: &mut RecursiveState,
-        input: &dyn InputFrames,
-        output: &mut dyn OutputFrames,
+        input: &dyn FrameSource,
+        output: &mut dyn FrameSink,
     ) -> u64 {
         let (mut replaced, mut first) = (0, 0);
         while first < input.frames() {
