@@ -14,7 +14,7 @@ use hybank::captures::Captures;
 use hybank::figures::Alone;
 use hybank::io::{Container, PcmFormat, ReadOptions};
 use hybank::pipeline::matching::{check_rate, common_rate};
-use hybank::quantity::{self, Time};
+use hybank::quantity::{self, WrittenTime};
 use hybank::sine_fit::Estimate;
 use hybank::spec::{DesignOverrides, Spec};
 use hybank::units::Seconds;
@@ -57,7 +57,7 @@ pub(super) struct Args {
     trim: Option<PathBuf>,
     /// How far apart the recordings began at most, as 50ms or 2s
     #[arg(long, value_name = "TIME", value_parser = quantity::time)]
-    within: Option<Time>,
+    within: Option<WrittenTime>,
     /// The channel whose clock is the time, from 1 [default: that of the spec's uncertainty table, or 1]
     #[arg(long, value_name = "I")]
     reference: Option<usize>,

@@ -11,7 +11,7 @@ use hybank::files::commit_all;
 use hybank::io::{Container, PcmFormat, read_stamped};
 use hybank::merge::{MergeSettings, MergeSource, Merged, SourceEstimate, merge};
 use hybank::messages::{Quoted, counted};
-use hybank::quantity::{self, Time, readable};
+use hybank::quantity::{self, WrittenTime, readable};
 use hybank::sine_fit::Estimate;
 use hybank::units::Hertz;
 use std::fmt::Write as _;
@@ -53,7 +53,7 @@ pub(super) struct Args {
     flat: bool,
     /// How far apart the recordings began at most, as 50ms or 2s
     #[arg(long, value_name = "TIME", value_parser = quantity::time)]
-    within: Option<Time>,
+    within: Option<WrittenTime>,
     /// Samples of the WAV file: integers, or floats
     #[arg(long, value_parser = bits(), default_value = "32f")]
     bits: PcmFormat,

@@ -149,7 +149,7 @@ fn rate(hertz: &serde_json::Value) -> String {
 }
 
 /// Real parts, and imaginary parts of complex samples.
-type Parts = (Vec<f64>, Option<Vec<f64>>);
+type SampleParts = (Vec<f64>, Option<Vec<f64>>);
 
 /// What is captured.
 struct CaptureRun<'a> {
@@ -161,21 +161,21 @@ struct CaptureRun<'a> {
 
 impl CaptureRun<'_> {
     /// The samples of channel `i`, and how many of their parts `clipped`.
-    fn capture(&self, i: usize, converter: &Sampler, clipped: &mut usize) -> Parts {
+    fn capture(&self, i: usize, converter: &Sampler, clipped: &mut usize) -> SampleParts {
         let Self { problem, signal, frames, .. } = *self;
         let delivered = signal.analog.captured(problem, i, converter, self.args.gain, frames);
         *clipped = delivered.clipped;
         (delivered.samples, delivered.imaginary)
     }
 
-    fn target(&self) -> Parts {
+    fn target(&self) -> SampleParts {
         self.signal.analog.target(self.problem, self.args.gain, self.frames)
     }
 
     /// All files appear together or not at all.
     fn write<'o>(
         &self,
-        recordings: impl Iterator<Item = (&'o OutputFile, Parts)>,
+        recordings: impl Iterator<Item = (&'o OutputFile, SampleParts)>,
         container: Container,
     ) -> Result<(), Failure> {
         let checked = recordings.map(|(output, samples)| Ok((output, self.checked(samples)?)));
@@ -187,7 +187,7 @@ impl CaptureRun<'_> {
     }
 
     /// A sample beyond the range of a 32-bit float is an error, not an infinity in the file.
-    fn checked(&self, parts: Parts) -> Result<Parts, Failure> {
+    fn checked(&self, parts: SampleParts) -> Result<SampleParts, Failure> {
         let mut all = parts.0.iter().chain(parts.1.iter().flatten());
         match all.find(|x| x.is_nan() || x.abs() > f64::from(f32::MAX)) {
             None => Ok(parts),

@@ -2,7 +2,7 @@
 
 use super::print::Failure;
 use hybank::io::PcmFormat;
-use hybank::quantity::{self, Time, readable};
+use hybank::quantity::{self, WrittenTime, readable};
 use hybank::simulate::{ErrorLists, ErrorRule, ErrorsOfConverter, RefusedError};
 use hybank::spec::{ChannelSpec, Spec};
 use hybank::units::Seconds;
@@ -20,13 +20,13 @@ pub(super) struct ErrorArgs {
     /// Aperture jitter: each sample is taken this much off its instant, rms, as 2ps or 0.01samples [default:
     /// 0]
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = quantity::time)]
-    jitter: Option<Time>,
+    jitter: Option<WrittenTime>,
     /// By how many parts per million the clocks are too fast, one value for all or one per channel
     #[arg(long, value_name = "PPM,..", value_delimiter = ',', allow_hyphen_values = true)]
     drift: Vec<f64>,
     /// True delays minus those of the spec, as 10ps or 0.01samples, one value for all or one per channel
     #[arg(long, value_name = "TIME,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::time)]
-    delay_error: Vec<Time>,
+    delay_error: Vec<WrittenTime>,
     /// Relative errors of the gains, as 1% or 0.01, one value for all or one per channel
     #[arg(long, value_name = "SHARE,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
     gain_error: Vec<f64>,

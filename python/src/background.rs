@@ -81,7 +81,7 @@ fn report(progress: Option<&Bound<'_, PyAny>>, stage: Stage) -> PyResult<()> {
 const EVERY: Duration = Duration::from_millis(100);
 
 /// Checks for signals now and then, and keeps what a handler raised.
-pub(crate) struct Signals {
+pub(crate) struct SignalCheck {
     state: Mutex<SignalState>,
 }
 
@@ -90,7 +90,7 @@ struct SignalState {
     raised: Option<PyErr>,
 }
 
-impl Signals {
+impl SignalCheck {
     pub(crate) fn new() -> Self {
         Self { state: Mutex::new(SignalState { next: Instant::now() + EVERY, raised: None }) }
     }

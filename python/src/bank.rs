@@ -7,7 +7,7 @@ use crate::fuse::{self, FuseRequest, parse_algorithm};
 use crate::hardware::{self, CircuitKeywords};
 use crate::outputs::write_file;
 use crate::pictures;
-use crate::responses::{self, Matrices, Row, Rows};
+use crate::responses::{self, DoubleRows, Doubles, Matrices};
 use crate::results::{FiguresReport, of_report, record};
 use crate::sources;
 use crate::stream::Stream;
@@ -201,19 +201,23 @@ impl Bank {
 
     #[doc = include_str!("docs/Bank.error_response.rst")]
     #[pyo3(signature = (n = 512))]
-    fn error_response<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Row<'py>, Row<'py>)> {
+    fn error_response<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Doubles<'py>, Doubles<'py>)> {
         responses::error_response(py, &self.bank, n)
     }
 
     #[doc = include_str!("docs/Bank.frequency_response.rst")]
     #[pyo3(signature = (n = 512))]
-    fn frequency_response<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Row<'py>, Rows<'py, Complex64>)> {
+    fn frequency_response<'py>(
+        &self,
+        py: Python<'py>,
+        n: i64,
+    ) -> PyResult<(Doubles<'py>, DoubleRows<'py, Complex64>)> {
         responses::frequency_response(py, &self.bank, n)
     }
 
     #[doc = include_str!("docs/Bank.front_end_gains.rst")]
     #[pyo3(signature = (n = 512))]
-    fn front_end_gains<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Row<'py>, Rows<'py>)> {
+    fn front_end_gains<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Doubles<'py>, DoubleRows<'py>)> {
         responses::front_end_gains(py, &self.bank, n)
     }
 

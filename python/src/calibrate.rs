@@ -93,7 +93,7 @@ pub(crate) fn reference_of(spec: &Spec, given: Option<usize>) -> PyResult<usize>
 
 /// A tone that was used.
 #[derive(serde::Serialize)]
-struct ToneReport {
+struct ToneRecord {
     frequency: Estimate<Hertz>,
     zone: usize,
     amplitude: f64,
@@ -122,12 +122,12 @@ fn result<'py>(py: Python<'py>, spec: &Spec, found: &Calibration) -> PyResult<Bo
         made = made.with(name, column(|found| found.value))?;
         made = made.with(&format!("{name}_sigma"), column(|found| found.sigma))?;
     }
-    let tone = |tone: &CalibrationTone| ToneReport {
+    let tone = |tone: &CalibrationTone| ToneRecord {
         frequency: tone.frequency,
         zone: tone.zone,
         amplitude: tone.amplitude.value,
     };
-    let tones: Vec<ToneReport> = found.tones.iter().map(tone).collect();
+    let tones: Vec<ToneRecord> = found.tones.iter().map(tone).collect();
     let (notes, warnings): (Vec<&CalibrationWarning>, _) =
         found.warnings.iter().chain(&more).partition(|warning| warning.is_note());
     warnings.iter().try_for_each(|warning| warn(py, warning))?;

@@ -1,7 +1,7 @@
 //! Fuses arrays.
 
 use crate::arrays::{ArrayShape, Held};
-use crate::background::{self, Signals};
+use crate::background::{self, SignalCheck};
 use crate::errors::{capture_error, refused, warn};
 use crate::formats::ArrayFormat;
 use crate::outputs::NewArray;
@@ -130,7 +130,7 @@ fn filtered<'py>(
     let parts: Vec<_> = parts.iter().map(Vec::as_slice).collect();
     let parts: Vec<_> = parts.iter().map(|part| Frames::new(part, 0..frames)).collect();
     let parts: Vec<&dyn FrameSource> = parts.iter().map(|part| part as _).collect();
-    let signals = Signals::new();
+    let signals = SignalCheck::new();
     let stop = || signals.raised();
     let outcome = py.detach(|| pipeline::fuse(bank, &plan, &parts, &mut room, settings, &stop));
     let outcome = outcome.map_err(|error| signals.into_error().unwrap_or_else(|| refused(error)))?;

@@ -111,7 +111,7 @@ fn result(py: Python<'_>, found: &Measurement) -> PyResult<Py<PyAny>> {
     };
     let warnings: Vec<String> = found.warnings().into_iter().map(text).collect();
     warnings.iter().try_for_each(|text| warn(py, text))?;
-    let spurs: Vec<_> = found.spurs.iter().map(|spur| Spur { spur, cause: causes(spur) }).collect();
+    let spurs: Vec<_> = found.spurs.iter().map(|spur| NamedSpur { spur, cause: causes(spur) }).collect();
     let figure = |of: Figure| (of.name, of.value, of.unit, of.meaning);
     let made = Made::of(py, "Measurement", found)?
         .with("sinad_db", found.sinad.0)?
@@ -132,7 +132,7 @@ fn result(py: Python<'_>, found: &Measurement) -> PyResult<Py<PyAny>> {
 
 /// A spur with its causes as a text.
 #[derive(serde::Serialize)]
-struct Spur<'a> {
+struct NamedSpur<'a> {
     #[serde(flatten)]
     spur: &'a quality::Spur,
     cause: String,

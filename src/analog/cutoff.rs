@@ -17,15 +17,13 @@ use super::AnalogError;
 use super::realise::{Chain, SeriesBlock};
 use super::roots::Roots;
 use super::section::{AnalogSection, Realisation};
-use crate::arithmetic::{Ball, Float512};
+use crate::arithmetic::{Ball, LongBall};
 use crate::spec::FilterSpec;
 use crate::units::Seconds;
 
-type Long = Ball<Float512>;
-
 /// A filter, and the share of its modulus that the terms beyond first order do not exceed.
 pub(crate) struct CutoffRemainder {
-    pub(crate) filter: Realisation<Long>,
+    pub(crate) filter: Realisation<LongBall>,
     pub(crate) share: f64,
 }
 
@@ -36,22 +34,25 @@ impl CutoffRemainder {
     /// # Errors
     /// As [`super::enclosed`].
     pub(crate) fn new(filter: &FilterSpec, h: Seconds, error: f64) -> Result<Option<Self>, AnalogError> {
-        let Chain { gain, blocks } = Chain::<Long>::new(filter, h)?;
+        let Chain { gain, blocks } = Chain::<LongBall>::new(filter, h)?;
         let sections = blocks.into_iter().map(|block| match block {
             SeriesBlock::Section(section) => Some(section),
             SeriesBlock::State(_) => None,
         });
-        let Some(sections) = sections.collect::<Option<Vec<AnalogSection<Long>>>>() else { return Ok(None) };
+        let Some(sections) = sections.collect::<Option<Vec<AnalogSection<LongBall>>>>() else {
+            return Ok(None);
+        };
         let share = beyond_first_order(&sections, Ball::from(error));
-        let damped = |section: AnalogSection<Long>| AnalogSection { zeros: damped(section.zeros), ..section };
+        let damped =
+            |section: AnalogSection<LongBall>| AnalogSection { zeros: damped(section.zeros), ..section };
         let blocks = sections.into_iter().map(damped).map(SeriesBlock::Section).collect();
         Ok(share.map(|share| Self { filter: Chain { gain, blocks }.realise(), share }))
     }
 }
 
 /// The zeros moved to -m.
-fn damped(zeros: Roots<Long>) -> Roots<Long> {
-    let real = |z: Long| Ball::from(-z.magnitude());
+fn damped(zeros: Roots<LongBall>) -> Roots<LongBall> {
+    let real = |z: LongBall| Ball::from(-z.magnitude());
     match zeros {
         Roots::None => Roots::None,
         Roots::One(z) => Roots::One(real(z)),
@@ -64,7 +65,7 @@ fn damped(zeros: Roots<Long>) -> Roots<Long> {
 }
 
 /// An upper bound of G(x) - G(0) - x G'(0).
-fn beyond_first_order(sections: &[AnalogSection<Long>], x: Long) -> Option<f64> {
+fn beyond_first_order(sections: &[AnalogSection<LongBall>], x: LongBall) -> Option<f64> {
     let one = Ball::from(1.0);
     let (mut value, mut constant, mut slope) = (one, one, Ball::ZERO);
     for AnalogSection { poles, zeros } in sections {
@@ -83,7 +84,11 @@ fn beyond_first_order(sections: &[AnalogSection<Long>], x: Long) -> Option<f64> 
 }
 
 /// `real` for each real root, and what `pair` makes of both roots of a pair.
-fn moduli(roots: Roots<Long>, real: Long, pair: impl Fn(Long, Long) -> Long) -> Vec<Long> {
+fn moduli(
+    roots: Roots<LongBall>,
+    real: LongBall,
+    pair: impl Fn(LongBall, LongBall) -> LongBall,
+) -> Vec<LongBall> {
     match roots {
         Roots::None => Vec::new(),
         Roots::One(_) => vec![real],

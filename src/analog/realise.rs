@@ -7,7 +7,7 @@ use super::pairing::pair_sections;
 use super::polynomial::enclosed_roots;
 use super::roots::{Factors, RootSet};
 use super::section::{AnalogSection, Realisation};
-use crate::arithmetic::{Ball, Float512, Real};
+use crate::arithmetic::{Ball, LongBall, Real};
 use crate::linalg::{Complex, Mat, eigenvalues, inverse, power_of_two, solve, to_complex};
 use crate::spec::{FilterSpec, Passband};
 use crate::units::Seconds;
@@ -30,7 +30,7 @@ pub(super) struct Chain<T> {
 }
 
 /// A number in which written filters are realised: `f64` for the design, a ball for the proof.
-pub(super) trait Written: Real {
+pub(super) trait RealNumber: Real {
     /// Zeros, poles and gain of `num(s) / den(s)`.
     fn quotient(num: &[f64], den: &[f64]) -> Result<Factors<Self>, AnalogError>;
 
@@ -38,7 +38,7 @@ pub(super) trait Written: Real {
     fn family(member: &Member, passband: Passband, h: Seconds) -> Result<Factors<Self>, AnalogError>;
 }
 
-impl Written for Ball<Float512> {
+impl RealNumber for LongBall {
     fn quotient(num: &[f64], den: &[f64]) -> Result<Factors<Self>, AnalogError> {
         let [num, den] = [num, den].map(without_leading_zeros);
         let (zeros, poles) = (enclosed_roots(num, "num")?, enclosed_roots(den, "den")?);
@@ -50,7 +50,7 @@ impl Written for Ball<Float512> {
     }
 }
 
-impl Written for f64 {
+impl RealNumber for f64 {
     fn quotient(num: &[f64], den: &[f64]) -> Result<Factors<Self>, AnalogError> {
         Ok(Ball::quotient(num, den)?.rounded())
     }
@@ -65,7 +65,7 @@ fn without_leading_zeros(values: &[f64]) -> &[f64] {
     &values[start..]
 }
 
-impl<T: Written> SeriesBlock<T> {
+impl<T: RealNumber> SeriesBlock<T> {
     pub(super) fn realise(&self) -> Realisation<T> {
         match self {
             Self::Section(section) => section.realise(),
@@ -98,7 +98,7 @@ pub(super) fn state_response(state: &Realisation<f64>, s: Complex<f64>) -> Compl
     (to_complex(&state.c) * x)[(0, 0)] + state.d
 }
 
-impl<T: Written> Chain<T> {
+impl<T: RealNumber> Chain<T> {
     /// Normalises by the fast period `h` a filter whose written form has been checked.
     pub(super) fn new(filter: &FilterSpec, h: Seconds) -> Result<Self, AnalogError> {
         let period = T::from(h.0);

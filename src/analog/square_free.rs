@@ -171,7 +171,7 @@ fn to_long(x: &BigInt) -> Float512 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arithmetic::Number;
+    use crate::arithmetic::ProvenFloat;
     use proptest::prelude::*;
 
     fn times(p: &[f64], q: &[f64]) -> Vec<f64> {

@@ -2,7 +2,7 @@
 
 use super::{Analog, Quantiser, Sampler};
 use crate::design::uncertainty::{Refused, of};
-use crate::quantity::Time;
+use crate::quantity::WrittenTime;
 use crate::spec::{
     ChannelCount, ChannelSpec, Cutoff, Fitting, MAX_LATENCY, Spec, SpecProblem, check_noise, check_offset,
     for_channels, within,
@@ -37,11 +37,11 @@ pub struct ErrorLists {
     /// counted.
     pub bits: Option<u32>,
     /// Aperture jitter: each sample is taken this much off its instant, rms.
-    pub jitter: Option<Time>,
+    pub jitter: Option<WrittenTime>,
     /// By how many parts per million the clocks are too fast.
     pub drift: Vec<f64>,
     /// True delays minus those of the spec.
-    pub delay_error: Vec<Time>,
+    pub delay_error: Vec<WrittenTime>,
     /// Relative errors of the gains.
     pub gain_error: Vec<f64>,
     /// Relative errors of the cut-offs of the front ends; of the stage that `fit` of the spec names, if it

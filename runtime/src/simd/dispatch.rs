@@ -12,10 +12,10 @@ use super::lanes::Lanes;
 #[cfg(target_arch = "aarch64")]
 use super::neon::{NeonF32, NeonF64};
 use super::portable::Portable;
-use super::vector::{Number, Vector};
+use super::vector::{Vector, VectorNumber};
 
 /// A sample type with its vector in each instruction set.
-pub(crate) trait SimdElement: Number {
+pub(crate) trait SimdElement: VectorNumber {
     /// One group as an array.
     type Portable: Vector<Sample = Self> + Lanes<Self>;
     /// One group.

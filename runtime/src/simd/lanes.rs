@@ -6,7 +6,7 @@
 
 use super::dispatch::SimdElement;
 use super::portable::Portable;
-use super::vector::Number;
+use super::vector::VectorNumber;
 use crate::Sample;
 use rustfft::FftNum;
 use rustfft::num_complex::Complex;
@@ -44,7 +44,7 @@ impl<T: Sample, const L: usize> Lanes<T> for Portable<T, L> {
 
 macro_rules! operator {
     ($operator:ident, $function:ident) => {
-        impl<T: Number, const L: usize> $operator for Portable<T, L> {
+        impl<T: VectorNumber, const L: usize> $operator for Portable<T, L> {
             type Output = Self;
 
             #[inline(always)]
@@ -61,7 +61,7 @@ operator!(Mul, mul);
 operator!(Div, div);
 operator!(Rem, rem);
 
-impl<T: Number, const L: usize> Neg for Portable<T, L> {
+impl<T: VectorNumber, const L: usize> Neg for Portable<T, L> {
     type Output = Self;
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! Gamma-iteration: the search for the least gamma for which the filtering Riccati equation has a solution.
 
-use super::filtering::{Filter, Innovations, RiccatiSolver, Trial};
+use super::filtering::{Innovations, ReferenceFilter, RiccatiSolver, Trial};
 use super::{GAMMA_ACCURACY, Synthesis};
 use crate::bank::SynthesisFilters;
 use crate::design::DesignError;
@@ -35,7 +35,7 @@ const WORTHWHILE_REDUCTION: f64 = 0.9;
 /// Filters with the norm of their error system.
 #[derive(Debug, Clone)]
 pub(super) struct EvaluatedFilters {
-    filters: Filter,
+    filters: ReferenceFilter,
     pub(super) peak: Peak,
 }
 
@@ -105,7 +105,7 @@ impl<'a> GammaIteration<'a> {
 
     /// The filters with their norm; `None` if rounding errors made the filters unstable or are as large as
     /// the norm.
-    pub(super) fn evaluate(&self, filters: Filter) -> Result<Option<EvaluatedFilters>, DesignError> {
+    pub(super) fn evaluate(&self, filters: ReferenceFilter) -> Result<Option<EvaluatedFilters>, DesignError> {
         let norm = self.plant.norm(&filters);
         match norm.and_then(|peak| Ok((self.plant.rounding(&filters)? < peak.gain, peak))) {
             Ok((is_known, peak)) if is_known || self.is_negligible(peak.gain) => {
@@ -126,7 +126,7 @@ impl<'a> GammaIteration<'a> {
     /// Keeps the first of the mean-square optimal filters that is stable.
     pub(super) fn start_from(
         &mut self,
-        mean_square: impl Iterator<Item = Filter>,
+        mean_square: impl Iterator<Item = ReferenceFilter>,
     ) -> Result<(), DesignError> {
         self.trials += 1;
         for filters in mean_square {

@@ -1,11 +1,11 @@
 //! The bank with the least gamma of all causal banks, by a-posteriori H-infinity filtering and
 //! gamma-iteration (thesis 5.3).
 
-use super::filtering::{Filter, Innovations, RiccatiSolver, Trial};
+use super::filtering::{Innovations, ReferenceFilter, RiccatiSolver, Trial};
 use super::gamma_iteration::{EvaluatedFilters, GammaIteration};
 use super::precise_filtering::PreciseFiltering;
 use super::{MethodSettings, Synthesis};
-use crate::arithmetic::{DoubleDouble, Float512, Number};
+use crate::arithmetic::{DoubleDouble, Float512, ProvenFloat};
 use crate::design::DesignError;
 use crate::design::limits::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS};
 use crate::design::plant::LiftedPlant;
@@ -36,7 +36,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &MethodSettings) -> Resu
 
 /// Goes on in the precision of `F` where the search so far left the optimum open, for plants of at most
 /// `limit` states.
-fn refine<F: Number>(
+fn refine<F: ProvenFloat>(
     plant: &LiftedPlant,
     iteration: &mut GammaIteration<'_>,
     limit: usize,
@@ -106,7 +106,7 @@ fn relaxed_with_noise(
 /// The filters with their norm, if it is at most `cap`.
 fn within(
     iteration: &mut GammaIteration<'_>,
-    filters: Filter,
+    filters: ReferenceFilter,
     cap: f64,
 ) -> Result<Option<EvaluatedFilters>, DesignError> {
     Ok(iteration.evaluate(filters)?.filter(|found| found.peak.gain <= cap))

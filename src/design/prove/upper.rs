@@ -8,7 +8,7 @@
 use super::enclosed_norm::EnclosedGains;
 use super::{leading_direction, witness};
 use crate::arithmetic::dense::{cholesky, product, riccati_limit, select, solve, symmetric};
-use crate::arithmetic::{BigFloat, Float512, Number};
+use crate::arithmetic::{BigFloat, Float512, ProvenFloat};
 use crate::bank::{Bank, Certificate, GainWitness};
 use crate::design::DesignError;
 use crate::design::limits::{MAX_LONG_STATES, Stop};
