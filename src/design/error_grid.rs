@@ -5,10 +5,10 @@
 //! may peak between two uniform points.
 
 use super::DesignError;
-use super::filters;
 use super::plant::LiftedPlant;
-use crate::linalg::{self, CMat, Mat};
-use crate::lmi::sampled::{FrequencyPoint, Taps};
+use crate::linalg::{self, CMat};
+use crate::lmi::sampled::FrequencyPoint;
+use crate::lti::FirMatrix;
 use crate::lti::peak::{Peak, local_maxima, refine};
 use std::f64::consts::PI;
 use std::sync::OnceLock;
@@ -45,7 +45,7 @@ pub(super) trait AffineError {
 
     /// The local maxima of `sigma_max(K)` over the frequencies for the unknowns `taps`, in any order. Those
     /// up to `level` may be left out.
-    fn peaks(&self, taps: &Taps, level: f64) -> Result<Vec<LocatedPeak<Self::Scenario>>, DesignError>;
+    fn peaks(&self, taps: &FirMatrix, level: f64) -> Result<Vec<LocatedPeak<Self::Scenario>>, DesignError>;
 }
 
 /// A frequency in one of the scenarios.
@@ -145,13 +145,13 @@ impl<'a> ErrorGrid<'a> {
     }
 
     /// The gain of the error with `taps` at each point.
-    pub(super) fn gains(&self, taps: &[Mat]) -> Result<Vec<f64>, DesignError> {
+    pub(super) fn gains(&self, taps: &FirMatrix) -> Result<Vec<f64>, DesignError> {
         (0..self.frequencies.all.len()).map(|k| gain(&self.error(k, taps))).collect()
     }
 
     /// The mean square of the error per slow period, for white noise of unit density at the analog input, by
     /// the trapezoidal rule on the equidistant frequencies.
-    pub(super) fn mean_square(&self, taps: &[Mat]) -> f64 {
+    pub(super) fn mean_square(&self, taps: &FirMatrix) -> f64 {
         let weights = self.mean_weights();
         let square = |k: usize| weights[k] * self.error(k, taps).norm_squared();
         self.frequencies.uniform.iter().map(|&k| square(k)).sum()
@@ -172,23 +172,23 @@ impl<'a> ErrorGrid<'a> {
     ///
     /// # Errors
     /// [`DesignError::Linalg`] if a decomposition does not converge.
-    pub(super) fn gamma(&self, taps: &[Mat]) -> Result<f64, DesignError> {
+    pub(super) fn gamma(&self, taps: &FirMatrix) -> Result<f64, DesignError> {
         Ok(self.maxima(taps)?.iter().map(|peak| peak.gain).fold(0.0, f64::max))
     }
 
     /// The local maxima of the error with `taps`.
-    fn maxima(&self, taps: &[Mat]) -> Result<Vec<Peak>, DesignError> {
+    fn maxima(&self, taps: &FirMatrix) -> Result<Vec<Peak>, DesignError> {
         let grid = self.gains(taps)?.into_iter().zip(&self.frequencies.all);
         let grid: Vec<Peak> = grid.map(|(gain, &frequency)| Peak { gain, frequency }).collect();
         let at = |frequency: f64| {
-            let error = self.plant.at(frequency).error(&filters::response(taps, frequency));
+            let error = self.plant.at(frequency).error(&taps.response(frequency));
             Ok(Peak { gain: gain(&error)?, frequency })
         };
         local_maxima(&grid).into_iter().map(|around| refine(at, around, FLAT_GAIN)).collect()
     }
 
-    fn error(&self, k: usize, taps: &[Mat]) -> CMat {
-        self.point(k).error(&filters::response(taps, self.frequencies.all[k]))
+    fn error(&self, k: usize, taps: &FirMatrix) -> CMat {
+        self.point(k).error(&taps.response(self.frequencies.all[k]))
     }
 
     fn point(&self, k: usize) -> &FrequencyPoint {
@@ -204,7 +204,7 @@ impl AffineError for ErrorGrid<'_> {
     }
 
     /// All of them: the largest is compared with the norm, so it has to be one below the level too.
-    fn peaks(&self, taps: &Taps, _level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
+    fn peaks(&self, taps: &FirMatrix, _level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
         Ok(self.maxima(taps)?.into_iter().map(LocatedPeak::from).collect())
     }
 }

@@ -25,7 +25,8 @@ use super::error_grid::{AffineError, GridFrequency};
 use super::limits::Stop;
 use crate::linalg;
 use crate::lmi::FINEST_GAP;
-use crate::lmi::sampled::{self, FrequencyPoint, LowerBound, MeanSquareObjective, SampledProblem, Taps};
+use crate::lmi::sampled::{self, FrequencyPoint, LowerBound, MeanSquareObjective, SampledProblem};
+use crate::lti::FirMatrix;
 
 /// Relative width of the interval `[lower, gamma]` at which the exchange ends.
 pub(crate) const GAMMA_ACCURACY: f64 = 5e-7;
@@ -85,7 +86,7 @@ impl Tolerances {
 #[derive(Debug, Clone)]
 pub(super) struct TapCandidate<S> {
     /// `F_j`, M x N.
-    pub(super) taps: Taps,
+    pub(super) taps: FirMatrix,
     /// Estimate of their gamma; equal to gamma if no peak was missed.
     pub(super) estimate: f64,
     /// The locations of the peaks that belong among the points.
@@ -289,7 +290,12 @@ impl<E: AffineError> Exchange<E> {
 
     /// The taps with the peaks of their error. None is searched once the design is stopped: `gamma`, that of
     /// the points, stands for them.
-    fn judge(&self, taps: Taps, gamma: f64, level: f64) -> Result<TapCandidate<E::Scenario>, DesignError> {
+    fn judge(
+        &self,
+        taps: FirMatrix,
+        gamma: f64,
+        level: f64,
+    ) -> Result<TapCandidate<E::Scenario>, DesignError> {
         let peaks = if self.stop.is_due() { Vec::new() } else { self.error.peaks(&taps, level)? };
         let estimate = peaks.iter().map(|peak| peak.gain).fold(gamma, f64::max);
         let above = peaks.into_iter().filter(|peak| peak.gain > level).map(|peak| peak.location).collect();

@@ -13,7 +13,7 @@ use crate::lti::gramian::h2_norm;
 use crate::lti::peak::{
     Peak, hinf_norm, hinf_norm_with_response, resonances, stable_poles, unexplained_peak,
 };
-use crate::lti::{FrequencyResponse, StateSpace};
+use crate::lti::{FirMatrix, FrequencyResponse, StateSpace};
 use std::f64::consts::PI;
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -188,27 +188,28 @@ impl LiftedPlant {
     /// # Panics
     /// Unless there is a filter for each channel.
     pub fn fir_norm(&self, taps: &[Vec<f64>]) -> Result<Peak, DesignError> {
-        let lags = filters::polyphase(taps, self.ratio());
-        let system = self.error_system(&self.delay_lines(&lags, &self.problem.measurement_units()?));
+        let fir = FirMatrix::polyphase(taps, self.ratio());
+        let system = self.error_system(&self.delay_lines(&fir, &self.problem.measurement_units()?));
         let (n, m) = (self.channels(), self.ratio());
         let response = |w: f64| {
             let g = self.at_frequency(w);
-            g.rows(n, m) - filters::response(&lags, w) * g.rows(0, n)
+            g.rows(n, m) - fir.response(w) * g.rows(0, n)
         };
         // Between 0 and pi a polynomial in e^{-jw} has at most one peak per lag.
-        let grid = FREQUENCIES_PER_LAG * lags.len();
+        let grid = FREQUENCIES_PER_LAG * fir.lags().len();
         let mut initial = self.resonances()?;
         initial.extend((1..grid).map(|k| PI * k as f64 / grid as f64));
         Ok(hinf_norm_with_response(&system, &response, initial)?)
     }
 
     /// FIR filters whose delay lines hold measurements of about unit size, each in its unit.
-    fn delay_lines(&self, lags: &[Mat], units: &[f64]) -> StateSpace {
-        let mut of_unit_size = lags.to_vec();
-        for lag in &mut of_unit_size {
+    fn delay_lines(&self, fir: &FirMatrix, units: &[f64]) -> StateSpace {
+        let of_unit_size = |lag: &Mat| {
+            let mut lag = lag.clone();
             lag.column_iter_mut().zip(units).for_each(|(mut column, unit)| column.unscale_mut(*unit));
-        }
-        StateSpace::fir(&of_unit_size).scale_inputs(units)
+            lag
+        };
+        fir.lags().iter().map(of_unit_size).collect::<FirMatrix>().state_space().scale_inputs(units)
     }
 
     /// ||K|| of a bank's filters, computed from the coefficients in the bank.

@@ -4,7 +4,8 @@
 use super::problem::{Channel, Problem};
 use super::{DesignError, LiftedPlant, filters};
 use crate::bank::{Bank, SynthesisFilters};
-use crate::linalg::{self, Complex, Mat};
+use crate::linalg::{self, Complex};
+use crate::lti::FirMatrix;
 use crate::units::{GridTime, Hertz, RadiansPerFastPeriod, RadiansPerSlowPeriod};
 use std::f64::consts::PI;
 
@@ -16,15 +17,15 @@ const MOST_PERIODS: usize = 4096;
 /// The impulse responses `f_i[n]` of the synthesis filters at the fast rate, all of one length. That of a
 /// recursive filter ends where 1e-12 of its energy is left, or after 4,096 slow periods.
 pub fn impulse_responses(bank: &Bank) -> Vec<Vec<f64>> {
-    let lags = match &bank.filters {
+    let fir = match &bank.filters {
         SynthesisFilters::Fir(taps) => return taps.clone(),
         SynthesisFilters::StateSpace(_) => lags_of_recursion(bank),
     };
-    filters::impulse_responses(&lags, lags.len() * bank.ratio)
+    fir.impulse_responses(fir.lags().len() * bank.ratio)
 }
 
 /// F_0 = D, F_j = C A^(j-1) B.
-fn lags_of_recursion(bank: &Bank) -> Vec<Mat> {
+fn lags_of_recursion(bank: &Bank) -> FirMatrix {
     let system = filters::lifted(&bank.filters, bank.ratio);
     let mut lags = vec![system.d().clone()];
     let mut state = system.b().clone();
@@ -43,7 +44,7 @@ fn lags_of_recursion(bank: &Bank) -> Vec<Mat> {
     });
     let kept = lags.len() - tail.count();
     lags.truncate(kept.max(1));
-    lags
+    FirMatrix::new(lags)
 }
 
 /// `F(e^{j w}) = sum_n f[n] e^{-j w n}` and its group delay, `-d arg F / d w`, in fast samples.

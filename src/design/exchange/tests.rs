@@ -23,7 +23,7 @@ impl AffineError for Geometric {
         self.point(location.frequency)
     }
 
-    fn peaks(&self, taps: &Taps, _level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
+    fn peaks(&self, taps: &FirMatrix, _level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
         let gain = |k: usize| {
             let location = GridFrequency { frequency: PI * k as f64 / self.grid as f64, scenario: () };
             LocatedPeak { gain: gain(&self.point(location.frequency), taps), location }
@@ -41,9 +41,9 @@ impl Geometric {
     }
 }
 
-fn gain(point: &FrequencyPoint, taps: &Taps) -> f64 {
+fn gain(point: &FrequencyPoint, taps: &FirMatrix) -> f64 {
     let mut k = point.w.clone();
-    for (j, f) in taps.iter().enumerate() {
+    for (j, f) in taps.lags().iter().enumerate() {
         k -= linalg::to_complex(f) * &point.h * Complex::from_polar(1.0, -point.omega * j as f64);
     }
     linalg::singular_values(&k).unwrap()[0]
@@ -128,7 +128,7 @@ fn a_zero_measurement_leaves_the_reference_and_a_zero_reference_has_no_error() {
     assert!((gamma - 2.0).abs() < 1e-9 && (zero_measurement.lower - 2.0).abs() < 1e-6, "{gamma}");
     let mut zero_reference = exchange(geometric(0.5, 0.0, &[1.0]), 2, 0.0);
     let best = zero_reference.optimise().unwrap();
-    assert!(best.estimate == 0.0 && best.taps.iter().all(|f| f.norm() == 0.0));
+    assert!(best.estimate == 0.0 && best.taps.lags().iter().all(|f| f.norm() == 0.0));
 }
 
 /// The optimum of all frequencies is that of a dense grid, solved at once.

@@ -10,7 +10,6 @@ use super::{GAMMA_ACCURACY, MethodSettings, Synthesis, tap_lags};
 use crate::design::DesignError;
 use crate::design::error_grid::{ErrorGrid, GridFrequency};
 use crate::design::exchange::{Exchange, LEAST_MARGIN};
-use crate::design::filters::impulse_responses;
 use crate::design::plant::LiftedPlant;
 use crate::lmi::sampled::{MeanSquareObjective, SampledProblem};
 use crate::lti::peak::Peak;
@@ -111,7 +110,7 @@ fn judged(
     exchange: &mut Exchange<ErrorGrid<'_>>,
 ) -> Result<EvaluatedTaps, DesignError> {
     let found = exchange.optimise()?;
-    let taps = impulse_responses(&found.taps, length);
+    let taps = found.taps.impulse_responses(length);
     let peak = plant.fir_norm(&taps)?;
     Ok(EvaluatedTaps { taps, estimate: found.estimate, peak })
 }

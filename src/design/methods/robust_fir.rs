@@ -11,12 +11,13 @@ use crate::bank::SynthesisFilters;
 use crate::design::DesignError;
 use crate::design::error_grid::{AffineError, ErrorGrid, GridFrequency, LocatedPeak};
 use crate::design::exchange::{Exchange, Tolerances};
-use crate::design::filters::{FilterResponse, impulse_responses};
+use crate::design::filters::FilterResponse;
 use crate::design::plant::LiftedPlant;
 use crate::design::uncertainty::box_plant::{BoxPlant, Combination};
 use crate::design::uncertainty::search::BoxSearch;
 use crate::linalg::{self, CMat};
-use crate::lmi::sampled::{FrequencyPoint, MeanSquareObjective, SampledProblem, Taps};
+use crate::lmi::sampled::{FrequencyPoint, MeanSquareObjective, SampledProblem};
+use crate::lti::FirMatrix;
 use crate::spec::{ErrorBox, Method, Spec};
 use crate::units::Seconds;
 
@@ -109,7 +110,7 @@ fn least_worst_norm(
     let mut rounds = 0;
     let (taps, largest_found) = loop {
         let found = exchange.optimise_at(Tolerances::gradual(NORM_ACCURACY))?;
-        let taps = impulse_responses(&found.taps, settings.taps);
+        let taps = found.taps.impulse_responses(settings.taps);
         let worst = exchange.error.search.worst(&SynthesisFilters::Fir(taps.clone()))?;
         let enough = found.estimate.max(exchange.lower) * (1.0 + NORM_ACCURACY);
         rounds += 1;
@@ -157,7 +158,7 @@ impl AffineError for BoxError {
         FrequencyPoint { omega: location.frequency, h: rows(0, count), w: rows(count, g.nrows() - count) }
     }
 
-    fn peaks(&self, taps: &Taps, level: f64) -> Result<Vec<LocatedPeak<Combination>>, DesignError> {
+    fn peaks(&self, taps: &FirMatrix, level: f64) -> Result<Vec<LocatedPeak<Combination>>, DesignError> {
         self.search.peaks(&FilterResponse::Polynomial(taps.clone()), level)
     }
 }

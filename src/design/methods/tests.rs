@@ -1,9 +1,10 @@
 //! Tests of all methods: shapes, bounds, and the norm computed independently.
 
 use super::*;
-use crate::design::filters::{lifted, polyphase};
+use crate::design::filters::lifted;
 use crate::design::merging::Repeats;
 use crate::linalg::{self, CMat, Complex};
+use crate::lti::FirMatrix;
 use crate::spec::Spec;
 use crate::units::Seconds;
 use std::f64::consts::PI;
@@ -74,7 +75,7 @@ fn filter_response(filters: &SynthesisFilters, ratio: usize, z: Complex<f64>) ->
         SynthesisFilters::StateSpace(_) => lifted(filters, ratio).response_at(z),
         SynthesisFilters::Fir(taps) => {
             let term = |j: usize, lag: &crate::linalg::Mat| linalg::to_complex(lag) * z.powi(-(j as i32));
-            polyphase(taps, ratio).iter().enumerate().map(|(j, lag)| term(j, lag)).sum()
+            FirMatrix::polyphase(taps, ratio).lags().iter().enumerate().map(|(j, lag)| term(j, lag)).sum()
         }
     }
 }

@@ -79,7 +79,7 @@ fn norms_are_those_of_dense_grids() {
             (plant.norm(&bank(&plant)).unwrap(), plant.error_system(&bank(&plant))),
             (
                 plant.fir_norm(&taps(&plant)).unwrap(),
-                plant.error_system(&StateSpace::fir(&filters::polyphase(&taps(&plant), plant.ratio()))),
+                plant.error_system(&FirMatrix::polyphase(&taps(&plant), plant.ratio()).state_space()),
             ),
         ] {
             let grid = dense_grid(&error);

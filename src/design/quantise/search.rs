@@ -5,7 +5,7 @@ use super::lattice::{IntegerSpan, closest};
 use super::problem::{RoundedTaps, Tap, TapError};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
-use crate::design::filters::polyphase;
+use crate::lti::FirMatrix;
 use crate::spec::WordLengths;
 
 /// Rounds of reweighting: with one, banks of `filters/` lose up to 2 dB more.
@@ -59,9 +59,9 @@ impl<'a> LatticeSearch<'a> {
     fn descended(&self, start: &FixedPoint) -> Result<FixedPoint, DesignError> {
         let points = &self.error.points;
         let integers = start.integers.iter().map(|list| list.iter().map(|&x| x as f64).collect()).collect();
-        let lags = polyphase(&start.taps(), self.error.ratio);
+        let fir = FirMatrix::polyphase(&start.taps(), self.error.ratio);
         let real = self.error.real_gamma;
-        let descent = Descent::new(points, &self.spans, start.step(), integers, &lags, real)?;
+        let descent = Descent::new(points, &self.spans, start.step(), integers, &fir, real)?;
         Ok(self.fixed_point(&descent.run(NEGLIGIBLE_LOSS, self.error.problem.stop)?))
     }
 
@@ -86,13 +86,13 @@ impl<'a> LatticeSearch<'a> {
         for _ in (0..ROUNDS).take_while(|_| !self.error.problem.stop.is_due()) {
             let candidate =
                 self.error.candidate(self.fixed_point(&self.closest(&self.centre, &weights, &[])?))?;
-            let lags = polyphase(&candidate.fixed_point.taps(), self.error.ratio);
+            let fir = FirMatrix::polyphase(&candidate.fixed_point.taps(), self.error.ratio);
             let excess_of_worst = candidate.gamma - real;
             found.push(candidate);
             if excess_of_worst <= NEGLIGIBLE_LOSS * real {
                 break;
             }
-            for (weight, gain) in weights.iter_mut().zip(self.error.grid.gains(&lags)?) {
+            for (weight, gain) in weights.iter_mut().zip(self.error.grid.gains(&fir)?) {
                 let excess = ((gain - real) / excess_of_worst).max(0.0);
                 *weight = (1.0 - REPLACED_SHARE) * *weight + REPLACED_SHARE * EMPHASIS * excess * excess;
             }

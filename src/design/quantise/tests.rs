@@ -3,9 +3,9 @@ use super::search::LatticeSearch;
 use super::*;
 use crate::bank::SynthesisFilters;
 use crate::design::error_grid::ErrorGrid;
-use crate::design::filters::polyphase;
 use crate::design::plant::LiftedPlant;
 use crate::design::{DesignOptions, Problem, Stop, design};
+use crate::lti::FirMatrix;
 use crate::spec::{MAX_FRACTION_BITS, Spec};
 use std::sync::LazyLock;
 
@@ -56,8 +56,8 @@ fn brute_force(plant: &LiftedPlant, rounded: &FixedPoint, reach: i64) -> f64 {
             inside &= (least..=most).contains(&point.integers[i][n]);
         }
         if inside {
-            let lags = polyphase(&point.taps(), plant.ratio());
-            best = best.min(ErrorGrid::new(plant, lags.len()).unwrap().gamma(&lags).unwrap());
+            let fir = FirMatrix::polyphase(&point.taps(), plant.ratio());
+            best = best.min(ErrorGrid::new(plant, fir.lags().len()).unwrap().gamma(&fir).unwrap());
         }
     }
     best
@@ -284,7 +284,7 @@ fn the_taps_of_least_square_are_a_minimum() {
     let quantiser = TapQuantiser::within(problem, 0.1).unwrap();
     let square = |taps: &[Vec<f64>]| {
         let own = taps.iter().zip(noise).map(|(f, power)| power * f.iter().map(|x| x * x).sum::<f64>());
-        quantiser.error.grid.mean_square(&polyphase(taps, 2)) + own.sum::<f64>()
+        quantiser.error.grid.mean_square(&FirMatrix::polyphase(taps, 2)) + own.sum::<f64>()
     };
     let least = quantiser.error.taps_of_least_square().unwrap();
     assert!(square(&least) < 0.99 * square(&taps));

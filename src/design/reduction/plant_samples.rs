@@ -7,9 +7,9 @@ use crate::design::error_grid::{AffineError, GridFrequency, LocatedPeak};
 use crate::design::exchange::Exchange;
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
-use crate::lmi::sampled::{self, FrequencyPoint, MeanSquareObjective, Taps};
+use crate::lmi::sampled::{self, FrequencyPoint, MeanSquareObjective};
 use crate::lti::peak::{peaks_above, resonances, stable_poles};
-use crate::lti::{FrequencyResponse, StateSpace};
+use crate::lti::{FirMatrix, FrequencyResponse, StateSpace};
 use std::f64::consts::PI;
 
 /// Intervals of the uniform frequencies.
@@ -64,7 +64,7 @@ impl<'a> PlantSamples<'a> {
         let error = OutputError { plant: self.plant, recursion, regressors };
         let mut exchange = Exchange::new(error, problem, std::iter::repeat(()), objective, gamma_margin);
         exchange.stop = self.stop.clone();
-        Ok(recursion.with_outputs(&exchange.optimise()?.taps[0]))
+        Ok(recursion.with_outputs(&exchange.optimise()?.taps.lags()[0]))
     }
 
     /// Trapezoidal weights of the uniform frequencies, zeros for the others.
@@ -90,8 +90,8 @@ impl AffineError for OutputError<'_> {
         driving(&self.regressors, self.plant.at(location.frequency))
     }
 
-    fn peaks(&self, taps: &Taps, level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
-        let error = self.plant.error_system(&self.recursion.with_outputs(&taps[0]));
+    fn peaks(&self, taps: &FirMatrix, level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
+        let error = self.plant.error_system(&self.recursion.with_outputs(&taps.lags()[0]));
         Ok(peaks_above(&error, level)?.into_iter().map(LocatedPeak::from).collect())
     }
 }

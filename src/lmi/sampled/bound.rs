@@ -12,9 +12,10 @@
 
 use super::basis::Basis;
 use super::prepare::ReducedProblem;
-use super::problem::{FrequencyPoint, SampledProblem, Taps};
+use super::problem::{FrequencyPoint, SampledProblem};
 use crate::linalg::blocks::Batch;
 use crate::linalg::{self, CMat, Complex, LinalgError, Mat};
+use crate::lti::FirMatrix;
 
 /// Thresholds tried between weak directions of tap space and rounding errors; the best bound counts.
 const CUTS: [f64; 3] = [1e-14, 1e-12, 1e-9];
@@ -88,11 +89,11 @@ fn strengths(problem: &SampledProblem) -> Vec<f64> {
 }
 
 /// Size of the taps, see [`Coverage`].
-fn size(problem: &SampledProblem, taps: &Taps) -> f64 {
+fn size(problem: &SampledProblem, taps: &FirMatrix) -> f64 {
     let strength = strengths(problem);
     let square =
         |f: &Mat| -> f64 { strength.iter().enumerate().map(|(i, s)| (s * f.column(i).norm()).powi(2)).sum() };
-    taps.iter().map(square).sum::<f64>().sqrt()
+    taps.lags().iter().map(square).sum::<f64>().sqrt()
 }
 
 /// The radius for which the bound is computed. Taps with a worst case below `gamma` satisfy `sum_l ||F
@@ -103,7 +104,7 @@ pub(super) fn cover(
     problem: &SampledProblem,
     reduced: &ReducedProblem,
     basis: &Basis,
-    (taps, gamma): (&Taps, f64),
+    (taps, gamma): (&FirMatrix, f64),
 ) -> Result<Coverage, LinalgError> {
     let reference = problem.points().iter().map(|p| p.w.norm()).fold(0.0, f64::max);
     let stated = RADIUS_FACTOR * size(problem, taps).max(reference);

@@ -7,18 +7,19 @@
 use super::basis::Basis;
 use super::interior::{InteriorIterate, Objective};
 use super::prepare::ReducedProblem;
-use super::problem::{FrequencyPoint, MeanSquareObjective, SampledProblem, Taps};
+use super::problem::{FrequencyPoint, MeanSquareObjective, SampledProblem};
 use super::quadratic::Quadratic;
 use crate::linalg::LinalgError;
 use crate::lmi::IsDue;
 use crate::lmi::factor::RegularisedCholesky;
 use crate::lmi::iteration::{self, Iterate, RANK_TOLERANCE};
+use crate::lti::FirMatrix;
 
 /// Taps of least mean square under a cap.
 #[derive(Debug, Clone)]
 pub struct CappedMeanSquare {
     /// `F_j`, M x N for each lag.
-    pub taps: Taps,
+    pub taps: FirMatrix,
     /// The secondary objective of these taps.
     pub mean_square: f64,
     /// Lower bound on it for any taps under the cap, from the dual iterate (valid up to rounding).
@@ -39,7 +40,7 @@ pub(crate) fn least_squares(
     problem: &SampledProblem,
     square: &MeanSquareObjective,
     tol_rank: f64,
-) -> Result<Taps, LinalgError> {
+) -> Result<FirMatrix, LinalgError> {
     let reduced = ReducedProblem::new(problem)?;
     if reduced.layout.unknowns() == 0 {
         return Ok(problem.zero_taps());
@@ -60,7 +61,7 @@ pub fn mean_square_under_cap(
     problem: &SampledProblem,
     square: &MeanSquareObjective,
     cap: f64,
-    start: &Taps,
+    start: &FirMatrix,
     tol_gap_rel: f64,
     is_due: IsDue<'_>,
 ) -> Result<Option<CappedMeanSquare>, LinalgError> {
@@ -88,14 +89,14 @@ pub fn mean_square_under_cap(
     let mut run = CappedIteration { engine, curvature };
     let (_, iterations) = iteration::run(&mut run, tol_gap_rel, is_due)?;
     let step = reduced.taps(&run.engine.x);
-    let found = start.iter().zip(step).map(|(f, d)| f + d * cap).collect();
+    let found = start.lags().iter().zip(step.lags()).map(|(f, d)| f + d * cap).collect();
     best.offer(best.within_cap(found)?)?;
     let lower = (best.mean_square - run.duality_gap() * (unit * cap * cap)).max(free_square);
     Ok(Some(best.finish(lower, iterations)))
 }
 
 /// The problem with the error of `start` as its reference.
-fn residual_problem(problem: &SampledProblem, start: &Taps) -> SampledProblem {
+fn residual_problem(problem: &SampledProblem, start: &FirMatrix) -> SampledProblem {
     let point = |l: usize| {
         let p = &problem.points()[l];
         FrequencyPoint { omega: p.omega, w: problem.error_at(l, start), h: p.h.clone() }
@@ -107,7 +108,7 @@ struct BestCapped<'a> {
     problem: &'a SampledProblem,
     square: &'a MeanSquareObjective,
     cap: f64,
-    taps: Taps,
+    taps: FirMatrix,
     mean_square: f64,
     gamma: f64,
 }
@@ -117,7 +118,7 @@ impl<'a> BestCapped<'a> {
         problem: &'a SampledProblem,
         square: &'a MeanSquareObjective,
         cap: f64,
-        start: &Taps,
+        start: &FirMatrix,
     ) -> Result<Self, LinalgError> {
         let gamma = problem.worst(start)?;
         let mean_square = problem.mean_square(start, square);
@@ -125,7 +126,7 @@ impl<'a> BestCapped<'a> {
     }
 
     /// Takes the taps if they respect the cap and improve.
-    fn offer(&mut self, taps: Taps) -> Result<(), LinalgError> {
+    fn offer(&mut self, taps: FirMatrix) -> Result<(), LinalgError> {
         let mean_square = self.problem.mean_square(&taps, self.square);
         let gamma = self.problem.worst(&taps)?;
         if gamma <= self.cap && (mean_square < self.mean_square || self.gamma > self.cap) {
@@ -136,13 +137,13 @@ impl<'a> BestCapped<'a> {
 
     /// The taps, or, if rounding has put them beyond the cap, ones on the way to them from the best so far.
     /// Gamma and the objective are convex, so what lies between is under the cap and an improvement.
-    fn within_cap(&self, taps: Taps) -> Result<Taps, LinalgError> {
+    fn within_cap(&self, taps: FirMatrix) -> Result<FirMatrix, LinalgError> {
         let gamma = self.problem.worst(&taps)?;
         if gamma <= self.cap || self.gamma >= self.cap {
             return Ok(taps);
         }
         let share = WAY_TO_CAP * (self.cap - self.gamma) / (gamma - self.gamma);
-        Ok(self.taps.iter().zip(taps).map(|(own, taps)| own + (taps - own) * share).collect())
+        Ok(self.taps.lags().iter().zip(taps.lags()).map(|(own, taps)| own + (taps - own) * share).collect())
     }
 
     fn finish(self, lower: f64, iterations: usize) -> CappedMeanSquare {

@@ -44,7 +44,7 @@
 //! let problem = SampledProblem::new((0..=32).map(point).collect(), vec![3]);
 //! let best = minimise(&problem, FINEST_GAP, &|| false)?;
 //! assert!((best.gamma - 0.125).abs() < 1e-8 && best.lower.value <= best.gamma);
-//! assert!((best.taps[1][(0, 0)] + 0.5).abs() < 1e-6);
+//! assert!((best.taps.lags()[1][(0, 0)] + 0.5).abs() < 1e-6);
 //! // A looser cap on the maximum gives a smaller mean square.
 //! let (square, cap) = (MeanSquareObjective::noiseless(vec![1.0 / 33.0; 33], 1), 1.1 * best.gamma);
 //! let found = mean_square_under_cap(&problem, &square, cap, &best.taps, FINEST_GAP, &|| false)?;
@@ -72,6 +72,5 @@ pub(crate) use bound::lower_bound;
 #[cfg(test)]
 pub(crate) use mean_square::least_squares;
 pub use mean_square::{CappedMeanSquare, mean_square_under_cap};
-pub(crate) use problem::response;
-pub use problem::{FrequencyPoint, MeanSquareObjective, SampledProblem, Taps};
+pub use problem::{FrequencyPoint, MeanSquareObjective, SampledProblem};
 pub use worst_case::{Solution, minimise};

@@ -2,9 +2,10 @@
 //! correlation.
 
 use super::fourier::{LagPhasors, TapLayout};
-use super::problem::{SampledProblem, Taps};
+use super::problem::SampledProblem;
 use crate::linalg::blocks::Batch;
 use crate::linalg::{self, CMat, LinalgError, Mat};
+use crate::lti::FirMatrix;
 
 /// Singular values of the row-normalised channels below this are rounding errors; their directions are
 /// dropped.
@@ -87,7 +88,7 @@ impl ReducedProblem {
     }
 
     /// The taps in the original channels.
-    pub(super) fn taps(&self, x: &[f64]) -> Taps {
+    pub(super) fn taps(&self, x: &[f64]) -> FirMatrix {
         let (m, n) = (self.layout.rows, self.layout.channels);
         let c = self.layout.scatter(x);
         c.column_iter().map(|col| Mat::from_column_slice(m, n, col.as_slice()) * &self.mix).collect()

@@ -1,10 +1,7 @@
 //! The data of a sampled problem.
 
-use crate::linalg::{self, CMat, Complex, LinalgError, Mat};
-
-/// Real taps: `F_j` is M x N, one matrix for each lag j. Entries beyond a row's own number of lags
-/// are zero.
-pub type Taps = Vec<Mat>;
+use crate::linalg::{self, CMat, LinalgError, Mat};
+use crate::lti::FirMatrix;
 
 /// A frequency with the responses of the reference and the measurements.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,8 +95,8 @@ impl SampledProblem {
     }
 
     /// Taps that are all zero.
-    pub(crate) fn zero_taps(&self) -> Taps {
-        vec![Mat::zeros(self.rows(), self.channels()); self.max_lags()]
+    pub(crate) fn zero_taps(&self) -> FirMatrix {
+        FirMatrix::new(vec![Mat::zeros(self.rows(), self.channels()); self.max_lags().max(1)])
     }
 
     /// The same problem with more points.
@@ -108,33 +105,23 @@ impl SampledProblem {
     }
 
     /// `K_l = W_l - sum_j e^{-i omega_l j} F_j H_l`.
-    pub(crate) fn error_at(&self, l: usize, taps: &Taps) -> CMat {
+    pub(crate) fn error_at(&self, l: usize, taps: &FirMatrix) -> CMat {
         let point = &self.points[l];
-        point.error(&response(taps, point.omega, self.rows(), self.channels()))
+        point.error(&taps.response(point.omega))
     }
 
     /// Largest `sigma_max(K_l)` over the points.
-    pub(crate) fn worst(&self, taps: &Taps) -> Result<f64, LinalgError> {
+    pub(crate) fn worst(&self, taps: &FirMatrix) -> Result<f64, LinalgError> {
         let gain = |l: usize| linalg::largest_singular_value(&self.error_at(l, taps));
         (0..self.points.len()).map(gain).try_fold(0.0, |worst, gain| Ok(f64::max(worst, gain?)))
     }
 
     /// Value of the secondary objective: see [`MeanSquareObjective`].
-    pub(crate) fn mean_square(&self, taps: &Taps, square: &MeanSquareObjective) -> f64 {
+    pub(crate) fn mean_square(&self, taps: &FirMatrix, square: &MeanSquareObjective) -> f64 {
         let error = |l: usize| self.error_at(l, taps).iter().map(|z| z.norm_sqr()).sum::<f64>();
         let errors: f64 = square.weights.iter().enumerate().map(|(l, w)| w * error(l)).sum();
         let noise =
             |f: &Mat| f.column_iter().zip(&square.noise).map(|(c, n)| n * c.norm_squared()).sum::<f64>();
-        errors + taps.iter().map(noise).sum::<f64>()
+        errors + taps.lags().iter().map(noise).sum::<f64>()
     }
-}
-
-/// `F(omega) = sum_j e^{-i omega j} F_j`.
-pub(crate) fn response(taps: &[Mat], omega: f64, m: usize, n: usize) -> CMat {
-    let mut f = CMat::zeros(m, n);
-    for (j, fj) in taps.iter().enumerate() {
-        let phase = Complex::from_polar(1.0, -omega * j as f64);
-        f.zip_apply(fj, |z, x| *z += phase * x);
-    }
-    f
 }

@@ -6,9 +6,10 @@
 
 use super::newton;
 use super::prepare::ReducedProblem;
-use super::problem::{MeanSquareObjective, Taps};
+use super::problem::MeanSquareObjective;
 use crate::linalg::Mat;
 use crate::linalg::blocks::Batch;
+use crate::lti::FirMatrix;
 
 /// See the module's text.
 #[derive(Debug, Clone)]
@@ -27,7 +28,7 @@ impl Quadratic {
     pub(super) fn new(
         reduced: &ReducedProblem,
         square: &MeanSquareObjective,
-        start: &Taps,
+        start: &FirMatrix,
         cap: f64,
         unit: f64,
     ) -> Self {
@@ -36,9 +37,9 @@ impl Quadratic {
         noisy.column_iter_mut().zip(&square.noise).for_each(|(mut column, noise)| column *= *noise);
         let gram = &noisy * reduced.mix.transpose() / unit;
         let (m, n) = (reduced.layout.rows, reduced.layout.channels);
-        let mut slope = Mat::zeros(m * n, start.len());
+        let mut slope = Mat::zeros(m * n, start.lags().len());
         let mut constant = 0.0;
-        for (j, f) in start.iter().enumerate() {
+        for (j, f) in start.lags().iter().enumerate() {
             let cross = f * noisy.transpose() * (2.0 / (unit * cap));
             slope.column_mut(j).copy_from_slice(cross.as_slice());
             let power = f.column_iter().zip(&square.noise).map(|(c, noise)| noise * c.norm_squared());

@@ -4,10 +4,11 @@ use super::basis::Basis;
 use super::bound::{self, LowerBound};
 use super::interior::{InteriorIterate, Objective, norm};
 use super::prepare::ReducedProblem;
-use super::problem::{SampledProblem, Taps};
+use super::problem::SampledProblem;
 use crate::linalg::LinalgError;
 use crate::lmi::IsDue;
 use crate::lmi::iteration::{self, GAP_OF_ZERO, Iterate, RANK_TOLERANCE};
+use crate::lti::FirMatrix;
 
 /// The start lies this factor above the worst point of the least-squares taps (in t), far enough inside for
 /// the first Newton step.
@@ -19,7 +20,7 @@ pub struct Solution {
     /// Whether the gap to the lower bound is within the tolerance.
     pub is_solved: bool,
     /// `F_j`, M x N for each lag.
-    pub taps: Taps,
+    pub taps: FirMatrix,
     /// Largest `sigma_max(K_l)` of these taps over the points.
     pub gamma: f64,
     /// Lower bound on gamma for all taps of the same lags, rounding errors subtracted.
@@ -80,13 +81,13 @@ fn fixed(problem: &SampledProblem) -> Result<Solution, LinalgError> {
 struct BestWorstCase {
     /// Gap that counts as zero.
     floor: f64,
-    taps: Taps,
+    taps: FirMatrix,
     gamma: f64,
     lower: LowerBound,
 }
 
 impl BestWorstCase {
-    fn new(problem: &SampledProblem, taps: Taps) -> Result<Self, LinalgError> {
+    fn new(problem: &SampledProblem, taps: FirMatrix) -> Result<Self, LinalgError> {
         let gamma = problem.worst(&taps)?;
         let floor = GAP_OF_ZERO * problem.worst(&problem.zero_taps())?;
         Ok(Self { floor, taps, gamma, lower: LowerBound { value: 0.0, covers_all: true } })

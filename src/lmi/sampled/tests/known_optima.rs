@@ -1,6 +1,7 @@
 //! Optima known from other software, closed forms and bounds.
 
 use super::*;
+use crate::linalg::Mat;
 
 /// Optima from the theory's table of golden numbers (independent solvers, 1e-7 and better).
 #[test]
@@ -142,12 +143,10 @@ fn lower_bounds_hold_for_any_taps_and_any_dual() {
     let mut r = Random(4);
     for k in 0..300 {
         let step = 10f64.powi(-(k % 8));
-        let mut taps = s.taps.clone();
-        for (j, f) in taps.iter_mut().enumerate() {
-            *f += crate::linalg::Mat::from_fn(2, 2, |p, _| {
-                if j < problem.lags()[p] { step * r.sample() } else { 0.0 }
-            });
-        }
+        let change = |(j, f): (usize, &Mat)| {
+            f + Mat::from_fn(2, 2, |p, _| if j < problem.lags()[p] { step * r.sample() } else { 0.0 })
+        };
+        let taps = s.taps.lags().iter().enumerate().map(change).collect();
         assert!(problem.worst(&taps).unwrap() >= s.lower.value);
         let near = |l: usize| problem.error_at(l, &taps) + random_matrix(&mut r, 2, 3) * Complex::from(step);
         let dual: Vec<CMat> = (0..problem.points().len()).map(near).collect();
