@@ -3,7 +3,7 @@
 use super::design_studies::{BandHint, WordReport, known, number, order_text, robust_text};
 use hybank::bank::{Bank, Gamma, SynthesisFilters};
 use hybank::design::{
-    Design, DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, analyze_mean,
+    Design, DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, Study, analyze_mean,
 };
 use hybank::figures::Figures;
 use hybank::messages::{Quoted, counted};
@@ -43,7 +43,6 @@ pub(super) struct DesignReport<'a> {
     peak_hertz: Hertz,
     #[serde(skip)]
     is_normalised: bool,
-    iterations: usize,
     seconds: f64,
     #[serde(flatten)]
     proof: ProofReport,
@@ -130,6 +129,10 @@ impl<'a> DesignReport<'a> {
     /// Of a bank written to `output`, designed in so many seconds.
     pub(super) fn new(output: String, design: &'a Design, judged: JudgedBank, seconds: f64) -> Self {
         let bank = &design.bank;
+        let (reduction, robust) = match &design.study {
+            Study::Fir { robust, .. } => (None, robust.as_ref()),
+            Study::Recursive { reduction } => (reduction.as_ref(), None),
+        };
         let (taps, states) = match &bank.filters {
             SynthesisFilters::Fir(taps) => (taps.first().map(Vec::len), None),
             SynthesisFilters::StateSpace(block) => (None, Some(block.a.len())),
@@ -145,14 +148,13 @@ impl<'a> DesignReport<'a> {
             taps,
             taps_chosen: design.sizing.taps_chosen,
             states,
-            reduction: design.reduction.as_ref(),
+            reduction,
             gamma: &bank.gamma,
             words: WordReport::of(design),
-            robust: design.robust.as_ref(),
+            robust,
             judged,
             peak_hertz: design.peak_frequency.in_hertz(bank.slow_period()),
             is_normalised: bank.is_normalised(),
-            iterations: design.iterations,
             seconds,
             proof: ProofReport::of(design),
         }
@@ -176,7 +178,7 @@ impl<'a> DesignReport<'a> {
             self.robust
                 .map(|study| robust_text(study, self.gamma.worst_case, self.proof.of_box()))
                 .unwrap_or_default(),
-            format!("designed in {:.1} ms, {}\n", self.seconds * 1e3, counted(self.iterations, "iteration")),
+            format!("designed in {:.1} ms\n", self.seconds * 1e3),
             self.proof.text(),
         ];
         parts.concat()

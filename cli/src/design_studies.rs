@@ -3,7 +3,7 @@
 use hybank::bank::{Bank, FixedPoint};
 use hybank::design::quantise::WordStudy;
 use hybank::design::{
-    Design, DesignError, DesignOptions, OrderErrorPoint, OrderReduction, RobustStudy, design,
+    Design, DesignError, DesignOptions, OrderErrorPoint, OrderReduction, RobustStudy, Study, design,
 };
 use hybank::figures::{snr, target_band};
 use hybank::messages::counted;
@@ -24,7 +24,8 @@ pub(super) struct WordReport<'a> {
 
 impl<'a> WordReport<'a> {
     pub(super) fn of(design: &'a Design) -> Option<Self> {
-        let (integers, study) = design.bank.fixed_point.as_ref().zip(design.words.as_ref())?;
+        let Study::Fir { words: Some(study), .. } = &design.study else { return None };
+        let integers = design.bank.fixed_point.as_ref()?;
         let loss_db = study.loss_db(design.bank.gamma.norm?);
         let FixedPoint { bits, fraction_bits, .. } = integers;
         Some(Self { bits, fraction_bits: *fraction_bits, loss_db, study })

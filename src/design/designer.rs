@@ -27,20 +27,31 @@ pub struct Design {
     pub sizing: Sizing,
     /// Frequency of the worst case.
     pub peak_frequency: RadiansPerSlowPeriod,
-    /// Number of Riccati equations solved, or of interior-point iterations.
-    pub iterations: usize,
-    /// For integer taps, the increase of the error that they cause.
-    pub words: Option<WordStudy>,
-    /// The result of the order reduction, if the spec asks for fewer states.
-    pub reduction: Option<OrderReduction>,
-    /// The comparison with a nominal bank, if the spec has an `[uncertainty]`.
-    pub robust: Option<RobustStudy>,
+    /// How the bank compares with others that the spec might have had.
+    pub study: Study,
     /// The bounds that the bank's proof proves, or the reason why the bank carries no proof.
     pub proof: Result<Verified, DesignError>,
     /// Why the proof does not cover the box of the spec's `[uncertainty]`, if it does not.
     pub box_unproven: Option<DesignError>,
     /// Time that the search for the proof took.
     pub proof_time: Duration,
+}
+
+/// How a bank compares with others, by the kind of its filters.
+#[derive(Debug, Clone)]
+pub enum Study {
+    /// Taps.
+    Fir {
+        /// With the real taps, if the spec asks for integer ones.
+        words: Option<WordStudy>,
+        /// With the bank that takes the errors for zero, if the spec has an `[uncertainty]`.
+        robust: Option<RobustStudy>,
+    },
+    /// A recursion.
+    Recursive {
+        /// With those of more and of fewer states, if the spec asks for fewer.
+        reduction: Option<OrderReduction>,
+    },
 }
 
 /// Whether [`design`] searches for a proof of the gammas. The search may take longer than the design.
@@ -154,7 +165,7 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
     let synthesis = Synthesis::of_taps(&plant, taps.clone())?;
     let filters = SynthesisFilters::Fir(taps);
     let norm_error = plant.norm_error(synthesis.peak.gain, &filters::lifted(&filters, problem.ratio))?;
-    let realised = Realised { filters, peak: synthesis.peak, norm_error, reduction: None, integers: None };
+    let realised = Realised { norm_error, ..Realised::of(filters, synthesis.peak) };
     let sizing = Sizing { latency, taps: length, latency_chosen: false, taps_chosen: false };
     let judged = judge(&complete, sizing, realised, &synthesis).without_unresolved_bounds(&problem);
     Ok(judged.proved(search, &Stop::default()))
@@ -162,8 +173,7 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
 
 /// The bank with the norm of its final coefficients. No lower bound exceeds that norm.
 fn judge(spec: &Spec, sizing: Sizing, realised: Realised, synthesis: &Synthesis) -> Design {
-    let Realised { filters, peak, norm_error, reduction, integers } = realised;
-    let (fixed_point, words) = integers.unzip();
+    let Realised { filters, peak, norm_error, fixed_point, study } = realised;
     let bank = Bank {
         fast_period: spec.fast_period,
         ratio: spec.ratio,
@@ -182,10 +192,7 @@ fn judge(spec: &Spec, sizing: Sizing, realised: Realised, synthesis: &Synthesis)
     Design {
         sizing,
         peak_frequency: RadiansPerSlowPeriod(peak.frequency),
-        iterations: synthesis.iterations,
-        words,
-        reduction,
-        robust: synthesis.robust.clone(),
+        study,
         proof: Err(DesignError::ProofSkipped),
         box_unproven: None,
         proof_time: Duration::ZERO,
@@ -208,7 +215,7 @@ impl Design {
             let begin = Instant::now();
             self.proof = prove::attach_proof(&mut self.bank, stop);
             // `verify` proves the worst case only with the rest.
-            if self.proof.is_ok() && self.robust.is_some() {
+            if self.proof.is_ok() && matches!(self.study, Study::Fir { robust: Some(_), .. }) {
                 self.box_unproven = prove::attach_box_proof(&mut self.bank, stop).err();
             }
             self.proof_time = begin.elapsed();

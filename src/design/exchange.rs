@@ -119,8 +119,6 @@ pub(super) struct Exchange<E: AffineError> {
     pub(super) stop: Stop,
     /// Problems solved.
     pub(super) rounds: usize,
-    /// Interior-point iterations of all rounds.
-    pub(super) iterations: usize,
 }
 
 impl<E: AffineError> Exchange<E> {
@@ -149,7 +147,6 @@ impl<E: AffineError> Exchange<E> {
             lower_for_all: 0.0,
             stop: Stop::default(),
             rounds: 0,
-            iterations: 0,
         }
     }
 
@@ -217,7 +214,7 @@ impl<E: AffineError> Exchange<E> {
     /// Solves the problem on the points.
     fn round(&mut self, tolerances: Tolerances, tolerance: f64) -> Result<Round<E::Scenario>, DesignError> {
         let solution = sampled::minimise(&self.problem, tolerance, &|| self.stop.is_due())?;
-        self.count_round(solution.iterations);
+        self.rounds += 1;
         self.raise_lower_bound(solution.lower);
         // The optimum lies anywhere between the two.
         let optimum = if tolerance > tolerances.finest() { self.lower } else { solution.gamma };
@@ -276,7 +273,7 @@ impl<E: AffineError> Exchange<E> {
             )?;
             // Gamma may be zero up to rounding: no cap lies above it then, and no other unknowns are better.
             let Some(found) = found else { return Ok(start) };
-            self.count_round(found.iterations);
+            self.rounds += 1;
             let candidate = self.judge(found.taps, found.gamma, cap_at_points)?;
             if candidate.estimate <= cap {
                 return Ok(candidate);
@@ -307,11 +304,6 @@ impl<E: AffineError> Exchange<E> {
             self.lower_for_all = self.lower_for_all.max(lower.value);
         }
         self.lower = self.lower.max(lower.value);
-    }
-
-    fn count_round(&mut self, iterations: usize) {
-        self.rounds += 1;
-        self.iterations += iterations;
     }
 }
 

@@ -40,7 +40,7 @@ pub use analysis::{
     Analysis, GammaScale, MeanAnalysis, analyze, analyze_mean, delay_point, noise_gain, norm_at,
 };
 pub(crate) use analysis::{NearestSample, nearest_samples};
-pub use designer::{Design, DesignOptions, ProofSearch, design, judge_taps};
+pub use designer::{Design, DesignOptions, ProofSearch, Study, design, judge_taps};
 pub(crate) use deviations::Deviations;
 pub use error::DesignError;
 pub use figure_band::{BandSource, FigureBand};

@@ -50,8 +50,6 @@ pub(super) struct GammaIteration<'a> {
     /// No causal filter achieves less.
     lower: f64,
     best: Option<EvaluatedFilters>,
-    /// Riccati equations solved.
-    trials: usize,
     /// Ends the search between two trials, with the best filters so far.
     stop: Stop,
     negligible: f64,
@@ -73,7 +71,6 @@ impl<'a> GammaIteration<'a> {
             feedthrough,
             lower: noncausal.gain.max(feedthrough),
             best: None,
-            trials: 0,
             stop: stop.clone(),
             negligible: ZERO_GAMMA * (system.c().norm() * system.b().norm() + system.d().norm()),
         })
@@ -128,7 +125,6 @@ impl<'a> GammaIteration<'a> {
         &mut self,
         mean_square: impl Iterator<Item = ReferenceFilter>,
     ) -> Result<(), DesignError> {
-        self.trials += 1;
         for filters in mean_square {
             if let Some(found) = self.evaluate(filters)? {
                 self.keep(found);
@@ -159,7 +155,6 @@ impl<'a> GammaIteration<'a> {
     /// Tries one gamma. A filter counts as found only if its computed norm confirms gamma.
     fn attempt(&mut self, gamma: f64) -> Result<Trial, DesignError> {
         for solver in self.solvers() {
-            self.trials += 1;
             match solver.h_infinity(gamma) {
                 Trial::Achieved(filters) => {
                     let Some(found) = self.evaluate(filters.clone())? else { continue };
@@ -281,7 +276,6 @@ impl<'a> GammaIteration<'a> {
             peak,
             lower: self.lower.min(peak.gain),
             noncausal: self.noncausal.gain.min(peak.gain),
-            iterations: self.trials,
             robust: None,
         }
     }

@@ -58,8 +58,6 @@ pub(crate) struct Synthesis {
     pub(crate) lower: f64,
     /// Lower bound of the norm over all filters of any latency. At most `peak.gain`.
     pub(crate) noncausal: f64,
-    /// Number of interior-point iterations or of Riccati equations solved.
-    pub(crate) iterations: usize,
     /// For a robust design.
     pub(crate) robust: Option<robust_fir::RobustStudy>,
 }
@@ -84,7 +82,6 @@ impl Synthesis {
             lower: lower.min(peak.gain).max(noncausal),
             peak,
             noncausal,
-            iterations: 0,
             robust: None,
         })
     }

@@ -73,12 +73,7 @@ pub(crate) fn synthesise(
     if study.robust.largest_found >= study.nominal.largest_found {
         return Ok(Synthesis { robust: Some(RobustStudy { robust: study.nominal, ..study }), ..nominal });
     }
-    Ok(Synthesis {
-        lower: nominal.lower.min(found.peak.gain),
-        iterations: nominal.iterations + found.iterations,
-        robust: Some(study),
-        ..found
-    })
+    Ok(Synthesis { lower: nominal.lower.min(found.peak.gain), robust: Some(study), ..found })
 }
 
 /// The study of a design that keeps the nominal bank.
@@ -133,8 +128,7 @@ fn least_worst_norm(
         pairs: exchange.locations.len(),
         ..study
     };
-    let found = Synthesis::of_least_gamma(plant, taps, peak, 0.0)?;
-    Ok((study, Synthesis { iterations: exchange.iterations, ..found }))
+    Ok((study, Synthesis::of_least_gamma(plant, taps, peak, 0.0)?))
 }
 
 /// The error of fixed taps over the box.
