@@ -9,7 +9,7 @@ use super::written::{Mono, begin_recording, check_output, write_text};
 use hybank::captures::Captures;
 use hybank::files::commit_all;
 use hybank::io::{Container, PcmFormat, read_stamped};
-use hybank::merge::{MergeSettings, MergeSource, Merged, SourceEstimate, merge};
+use hybank::merge::{MergeSettings, Merged, Recorder, SourceEstimate, merge};
 use hybank::messages::{Quoted, counted};
 use hybank::quantity::{self, WrittenTime, readable};
 use hybank::sine_fit::Estimate;
@@ -102,7 +102,7 @@ impl Args {
     }
 
     /// All recordings; what was tolerated joins the `warnings`.
-    fn sources(&self, warnings: &mut Vec<String>) -> Result<Vec<MergeSource>, Failure> {
+    fn sources(&self, warnings: &mut Vec<String>) -> Result<Vec<Recorder>, Failure> {
         let mut sources = Vec::new();
         for path in &self.recordings {
             match self.stamped(path)? {
@@ -114,7 +114,7 @@ impl Args {
     }
 
     /// The columns of a table with time stamps; `None` if the file is none.
-    fn stamped(&self, path: &Path) -> Result<Option<Vec<MergeSource>>, Failure> {
+    fn stamped(&self, path: &Path) -> Result<Option<Vec<Recorder>>, Failure> {
         if is_dash(path) || !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
             return Ok(None);
         }
@@ -124,7 +124,7 @@ impl Args {
         };
         let rate = Hertz((table.stamps.len() - 1) as f64 / (*last - *first).0);
         let many = table.columns.len() > 1;
-        let source = |(k, samples): (usize, Vec<f64>)| MergeSource {
+        let source = |(k, samples): (usize, Vec<f64>)| Recorder {
             name: if many { format!("{} column {}", name(path), k + 2) } else { name(path) },
             record: hybank::calibrate::Record::new(samples),
             rate,
@@ -134,7 +134,7 @@ impl Args {
         Ok(Some(table.columns.into_iter().enumerate().map(source).collect()))
     }
 
-    fn recorded(&self, path: &Path, warnings: &mut Vec<String>) -> Result<MergeSource, Failure> {
+    fn recorded(&self, path: &Path, warnings: &mut Vec<String>) -> Result<Recorder, Failure> {
         let mut reader = start(&[path.to_path_buf()], self.reading.format().options(1, 1))?;
         self.reading.scale.check(&reader)?;
         Captures::check_mono(&reader).map_err(unread)?;
@@ -154,7 +154,7 @@ impl Args {
         // A step of integers, of which full scale is 1.
         let integer = format.filter(|format| !format.is_float());
         let step = integer.map_or(0.0, |format| 2.0_f64.powi(1 - 8 * format.bytes() as i32));
-        Ok(MergeSource { name: name(path), record, rate, step, stamps: None })
+        Ok(Recorder { name: name(path), record, rate, step, stamps: None })
     }
 
     /// Writes the result, and says what could not be kept; times of a table count from that of the first

@@ -31,7 +31,7 @@ pub(crate) struct Stream {
 }
 
 /// How a pickle makes a stream: a function and its arguments.
-type Reduced<'py> =
+type Pickled<'py> =
     (Bound<'py, PyAny>, (Bound<'py, PyBank>, isize, &'static str, String, Bound<'py, PyBytes>, bool));
 
 impl Stream {
@@ -202,7 +202,7 @@ impl Stream {
         self.gaps.is_none() && self.read(py, |pipeline| pipeline.agrees(state))
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         let (py, own) = (slf.py(), slf.get());
         let state = own.state(py)?;
         let closed = py.detach(|| own.lock().is_closed);

@@ -31,7 +31,7 @@ use crate::units::Seconds;
 use course::{Course, mean};
 use path::Disagree;
 use pieces::{PieceEstimate, Pieces};
-use steps::{Lags, MendedRecording, mended, spliced};
+use steps::{Lags, Mended, mended, spliced};
 
 /// Least samples that all recordings have in common.
 const LEAST_SAMPLES: usize = 1024;
@@ -141,7 +141,7 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
     enough(records.iter().map(|record| record.samples.len()).min().unwrap_or(0))?;
     let within = within.map_or(f64::INFINITY, |time| time / (spec.fast_period * spec.ratio as f64));
     let placed = |i: usize| match i == reference {
-        true => Ok(MendedRecording { record: records[i].clone(), steps: Vec::new(), lags: Lags::none() }),
+        true => Ok(Mended { record: records[i].clone(), steps: Vec::new(), lags: Lags::none() }),
         false => placed(records, reference, i, within),
     };
     let placed = (0..records.len()).map(placed).collect::<Result<Vec<_>, _>>()?;
@@ -157,12 +157,7 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
 }
 
 /// The recording of channel `i` with its steps mended, and where it lies beside the reference.
-fn placed(
-    records: &[Record],
-    reference: usize,
-    i: usize,
-    within: f64,
-) -> Result<MendedRecording, AlignError> {
+fn placed(records: &[Record], reference: usize, i: usize, within: f64) -> Result<Mended, AlignError> {
     let (own, other) = (&records[reference], &records[i]);
     let (reference, channel) = (reference + 1, i + 1);
     let line = line(own, other, within).map_err(|lags| match lags.is_empty() {

@@ -20,7 +20,7 @@ const SURE: f64 = 1024.0;
 const PLACE_ODDS: f64 = 20.0;
 
 /// A recording whose steps are mended.
-pub(super) struct MendedRecording {
+pub(super) struct Mended {
     /// Lost samples are NaN.
     pub(super) record: Record,
     pub(super) steps: Vec<ClockStep>,
@@ -76,7 +76,7 @@ struct Jump {
 }
 
 /// Finds the steps of a recording that lies near a line.
-pub(super) fn mended(reference: &Record, other: &Record, line: LagLine) -> Result<MendedRecording, Disagree> {
+pub(super) fn mended(reference: &Record, other: &Record, line: LagLine) -> Result<Mended, Disagree> {
     let path = PathSearch::new(reference, other, line).known()?;
     let jumps = jumps(&path);
     let mut steps: Vec<ClockStep> = Vec::new();
@@ -90,7 +90,7 @@ pub(super) fn mended(reference: &Record, other: &Record, line: LagLine) -> Resul
         keep: spliced(&other.keep, &steps, false),
         clipped: other.clipped,
     };
-    Ok(MendedRecording { record, steps, lags: Lags::new(path, &jumps) })
+    Ok(Mended { record, steps, lags: Lags::new(path, &jumps) })
 }
 
 /// The samples of a recording without its steps: a filler takes the place of those that are lost, or that

@@ -16,7 +16,7 @@
 use super::AnalogError;
 use super::realise::{Chain, SeriesBlock};
 use super::roots::Roots;
-use super::section::{AnalogSection, Realisation};
+use super::section::{Biquad, Realisation};
 use crate::arithmetic::{Ball, LongBall};
 use crate::spec::FilterSpec;
 use crate::units::Seconds;
@@ -39,12 +39,11 @@ impl CutoffRemainder {
             SeriesBlock::Section(section) => Some(section),
             SeriesBlock::State(_) => None,
         });
-        let Some(sections) = sections.collect::<Option<Vec<AnalogSection<LongBall>>>>() else {
+        let Some(sections) = sections.collect::<Option<Vec<Biquad<LongBall>>>>() else {
             return Ok(None);
         };
         let share = beyond_first_order(&sections, Ball::from(error));
-        let damped =
-            |section: AnalogSection<LongBall>| AnalogSection { zeros: damped(section.zeros), ..section };
+        let damped = |section: Biquad<LongBall>| Biquad { zeros: damped(section.zeros), ..section };
         let blocks = sections.into_iter().map(damped).map(SeriesBlock::Section).collect();
         Ok(share.map(|share| Self { filter: Chain { gain, blocks }.realise(), share }))
     }
@@ -65,10 +64,10 @@ fn damped(zeros: Roots<LongBall>) -> Roots<LongBall> {
 }
 
 /// An upper bound of G(x) - G(0) - x G'(0).
-fn beyond_first_order(sections: &[AnalogSection<LongBall>], x: LongBall) -> Option<f64> {
+fn beyond_first_order(sections: &[Biquad<LongBall>], x: LongBall) -> Option<f64> {
     let one = Ball::from(1.0);
     let (mut value, mut constant, mut slope) = (one, one, Ball::ZERO);
-    for AnalogSection { poles, zeros } in sections {
+    for Biquad { poles, zeros } in sections {
         for c in moduli(*zeros, one, |_, _| Ball::from(2.0).sqrt()) {
             (value, constant, slope) = (value * (c + x), constant * c, slope + one / c);
         }

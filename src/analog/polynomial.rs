@@ -7,7 +7,7 @@
 //! The centres lie symmetric about the real axis, so the root of a real centre is real, and two conjugate
 //! discs hold a conjugate pair.
 
-use crate::arithmetic::{Ball, Cartesian, ComplexBall, Float512, LongBall, ProvenFloat};
+use crate::arithmetic::{Ball, Cartesian, ComplexBall, Float, Float512, LongBall};
 use crate::linalg::{self, Complex, Mat};
 
 use super::AnalogError;

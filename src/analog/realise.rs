@@ -6,7 +6,7 @@ use super::families::{self, Member};
 use super::pairing::pair_sections;
 use super::polynomial::enclosed_roots;
 use super::roots::{Factors, RootSet};
-use super::section::{AnalogSection, Realisation};
+use super::section::{Biquad, Realisation};
 use crate::arithmetic::{Ball, LongBall, Real};
 use crate::linalg::{Complex, Mat, eigenvalues, inverse, power_of_two, solve, to_complex};
 use crate::spec::{FilterSpec, Passband};
@@ -17,7 +17,7 @@ use nalgebra::DMatrix;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum SeriesBlock<T> {
     /// One or two poles with at most as many zeros.
-    Section(AnalogSection<T>),
+    Section(Biquad<T>),
     /// State equations as the spec gives them.
     State(Realisation<T>),
 }
@@ -156,10 +156,9 @@ impl<T: RealNumber> Chain<T> {
     /// H(s / factor), a positive number.
     pub(super) fn stretched(&self, factor: T) -> Self {
         let stretched = |block: &SeriesBlock<T>| match block {
-            SeriesBlock::Section(AnalogSection { poles, zeros }) => SeriesBlock::Section(AnalogSection {
-                poles: poles.scaled(factor),
-                zeros: zeros.scaled(factor),
-            }),
+            SeriesBlock::Section(Biquad { poles, zeros }) => {
+                SeriesBlock::Section(Biquad { poles: poles.scaled(factor), zeros: zeros.scaled(factor) })
+            }
             SeriesBlock::State(state) => SeriesBlock::State(state.stretched(factor)),
         };
         Self { gain: self.gain, blocks: self.blocks.iter().map(stretched).collect() }

@@ -171,7 +171,7 @@ fn to_long(x: &BigInt) -> Float512 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arithmetic::ProvenFloat;
+    use crate::arithmetic::Float;
     use proptest::prelude::*;
 
     fn times(p: &[f64], q: &[f64]) -> Vec<f64> {

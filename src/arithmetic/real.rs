@@ -1,6 +1,6 @@
 //! What formulas need that are computed in doubles and in balls.
 
-use super::{Ball, ProvenFloat};
+use super::{Ball, Float};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Numbers with the four operations.
@@ -39,7 +39,7 @@ impl Real for f64 {
     }
 }
 
-impl<F: ProvenFloat> Real for Ball<F> {
+impl<F: Float> Real for Ball<F> {
     fn to_double(self) -> f64 {
         self.nearest()
     }

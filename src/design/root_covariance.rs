@@ -117,7 +117,7 @@ pub(super) struct PartialHistory<'a> {
 
 /// An estimate from known samples.
 #[derive(Debug)]
-pub(super) struct LinearEstimate {
+pub(super) struct Projection {
     /// The weights of the known samples.
     pub(super) weights: Vec<f64>,
     /// The mean square of its error.
@@ -126,16 +126,13 @@ pub(super) struct LinearEstimate {
 
 impl PartialHistory<'_> {
     /// The estimate of a sample of the history.
-    pub(super) fn sample(&self, place: usize) -> LinearEstimate {
+    pub(super) fn sample(&self, place: usize) -> Projection {
         let own = self.whole.samples.row(place);
         let projection = own * self.basis.transpose();
         let error = (own - &projection * &self.basis).norm_squared();
         // Every sample has noise, so none of the known ones follows from the others.
         let weights = self.samples.tr_solve_lower_triangular(&projection.transpose());
-        LinearEstimate {
-            weights: weights.map_or_else(Vec::new, |weights| weights.as_slice().to_vec()),
-            error,
-        }
+        Projection { weights: weights.map_or_else(Vec::new, |weights| weights.as_slice().to_vec()), error }
     }
 
     /// The error of the estimate of the target at `instant`.

@@ -1,7 +1,7 @@
 //! The instants of all samples on the clock of the first source, and their gains.
 
 use super::error::{MergeError, MergeWarning};
-use super::{MergeSource, SourceEstimate};
+use super::{Recorder, SourceEstimate};
 use crate::align::{AlignSettings, AlignWarning, Alignment, ClockCourse, align};
 use crate::calibrate::Record;
 use crate::instants::{
@@ -40,14 +40,14 @@ pub(super) struct Clocked {
 /// # Errors
 /// [`MergeError`].
 pub(super) fn placed(
-    sources: &[MergeSource],
+    sources: &[Recorder],
     rate: Hertz,
     within: Option<Seconds>,
 ) -> Result<Clocked, MergeError> {
     if let Some(flat) = sources.iter().find(|source| is_flat(&source.record)) {
         return Err(MergeError::NoSignal { name: flat.name.clone() });
     }
-    let has_stamps = |source: &&MergeSource| source.stamps.is_some();
+    let has_stamps = |source: &&Recorder| source.stamps.is_some();
     match (sources.iter().find(has_stamps), sources.iter().find(|source| !has_stamps(source))) {
         (Some(stamped), Some(plain)) => {
             Err(MergeError::SomeStamps { stamped: stamped.name.clone(), plain: plain.name.clone() })
@@ -82,7 +82,7 @@ fn plain(start: Seconds) -> SourceEstimate {
     SourceEstimate { start, drift: None, gain: None, noise: 0.0, steps: Vec::new() }
 }
 
-fn alone(source: &MergeSource, rate: Hertz) -> Clocked {
+fn alone(source: &Recorder, rate: Hertz) -> Clocked {
     let (samples, level) = usable(&source.record);
     let clock = Clock::even(FastPeriods(0.0), FastPeriods(rate.0 / source.rate.0));
     Clocked {
@@ -96,8 +96,8 @@ fn alone(source: &MergeSource, rate: Hertz) -> Clocked {
     }
 }
 
-fn by_stamps(sources: &[MergeSource], rate: Hertz) -> Result<Clocked, MergeError> {
-    let stamps = |source: &MergeSource| source.stamps.clone().unwrap_or_default();
+fn by_stamps(sources: &[Recorder], rate: Hertz) -> Result<Clocked, MergeError> {
+    let stamps = |source: &Recorder| source.stamps.clone().unwrap_or_default();
     let origin = stamps(&sources[0]).first().copied().unwrap_or(Seconds(0.0));
     let level = usable(&sources[0].record).1;
     let (mut recordings, mut found) = (Vec::new(), Vec::new());
@@ -122,11 +122,7 @@ fn by_stamps(sources: &[MergeSource], rate: Hertz) -> Result<Clocked, MergeError
     })
 }
 
-fn by_alignment(
-    sources: &[MergeSource],
-    rate: Hertz,
-    within: Option<Seconds>,
-) -> Result<Clocked, MergeError> {
+fn by_alignment(sources: &[Recorder], rate: Hertz, within: Option<Seconds>) -> Result<Clocked, MergeError> {
     let own = sources[0].rate;
     let records: Vec<Record> = sources.iter().map(|source| at_rate(source, own)).collect::<Result<_, _>>()?;
     // The spec counts in samples.
@@ -185,13 +181,7 @@ struct ClockedSamples {
 }
 
 /// The clock of a source in periods of the output, and its samples without those amid a step.
-fn place(
-    source: &MergeSource,
-    alignment: &Alignment,
-    number: usize,
-    own: Hertz,
-    ratio: f64,
-) -> ClockedSamples {
+fn place(source: &Recorder, alignment: &Alignment, number: usize, own: Hertz, ratio: f64) -> ClockedSamples {
     let course = alignment.instants(number);
     let (mut samples, _) = usable(&source.record);
     let stretch = if is_same(source.rate, own) { 1.0 } else { own.0 / source.rate.0 };
@@ -219,7 +209,7 @@ fn is_same(one: Hertz, other: Hertz) -> bool {
 }
 
 /// The record at the rate `own`, to be compared.
-fn at_rate(source: &MergeSource, own: Hertz) -> Result<Record, MergeError> {
+fn at_rate(source: &Recorder, own: Hertz) -> Result<Record, MergeError> {
     if is_same(source.rate, own) {
         return Ok(source.record.clone());
     }

@@ -32,7 +32,7 @@ const LEAST_GAIN: Decibels = Decibels(0.5);
 
 /// What one recorder or logger delivered.
 #[derive(Debug, Clone, PartialEq)]
-pub struct MergeSource {
+pub struct Recorder {
     /// Its name in messages.
     pub name: String,
     /// The samples; of clipped and lost ones nothing is used.
@@ -119,13 +119,13 @@ impl Quality {
 ///
 /// # Errors
 /// [`MergeError`].
-pub fn merge(sources: &[MergeSource], settings: MergeSettings) -> Result<Merged, MergeError> {
+pub fn merge(sources: &[Recorder], settings: MergeSettings) -> Result<Merged, MergeError> {
     let rate = output_rate(sources, settings)?;
     let Clocked { recordings, found, gains, gain_deviations, delay_deviations, level, mut warnings } =
         clocks::placed(sources, rate, settings.within)?;
     let (first, grid) = grid(sources, &recordings, rate)?;
     check_memory(grid.count)?;
-    let step_noise = |source: &MergeSource| source.step * source.step / 12.0;
+    let step_noise = |source: &Recorder| source.step * source.step / 12.0;
     let prior = Prior {
         band: settings.band.map(|band| CyclesPerFastPeriod((band.0 / rate.0).min(0.5))),
         passes: if settings.learn { PASSES } else { 0 },
@@ -145,12 +145,12 @@ pub fn merge(sources: &[MergeSource], settings: MergeSettings) -> Result<Merged,
     Ok(Merged { samples, rate, first, begin, sources, quality, warnings })
 }
 
-fn clipped(source: &MergeSource) -> Option<MergeWarning> {
+fn clipped(source: &Recorder) -> Option<MergeWarning> {
     let clipped = source.record.clipped;
     (clipped > 0).then(|| MergeWarning::Clipped { name: source.name.clone(), clipped })
 }
 
-fn output_rate(sources: &[MergeSource], settings: MergeSettings) -> Result<Hertz, MergeError> {
+fn output_rate(sources: &[Recorder], settings: MergeSettings) -> Result<Hertz, MergeError> {
     let first = sources.first().ok_or(MergeError::NoSources)?.rate;
     let sum: f64 = sources.iter().map(|source| source.rate.0).sum();
     // Stated rates are rounded.
@@ -165,7 +165,7 @@ fn output_rate(sources: &[MergeSource], settings: MergeSettings) -> Result<Hertz
 
 /// The first sample of the first source that all have in common, and the outputs from there on.
 fn grid(
-    sources: &[MergeSource],
+    sources: &[Recorder],
     recordings: &[Recording],
     rate: Hertz,
 ) -> Result<(usize, FusionSettings), MergeError> {

@@ -10,7 +10,7 @@
 use super::ball::{self, Ball, Matrix};
 use super::slow_period::SlowPeriod;
 use super::system::EnclosedSystem;
-use crate::arithmetic::{DoubleDouble, ProvenFloat};
+use crate::arithmetic::{DoubleDouble, Float};
 use crate::bank::{StateMatrices, SynthesisFilters};
 use crate::linalg;
 use std::ops::Range;
@@ -24,7 +24,7 @@ pub(super) struct BlockForm<F = DoubleDouble> {
     pub(super) d: Matrix<F>,
 }
 
-impl<F: ProvenFloat> BlockForm<F> {
+impl<F: Float> BlockForm<F> {
     pub(super) fn new(filters: &SynthesisFilters, ratio: usize) -> Self {
         match filters {
             SynthesisFilters::Fir(taps) => Self::from_taps(taps, ratio),
@@ -95,7 +95,7 @@ struct StateRanges {
 }
 
 impl StateRanges {
-    fn new<F: ProvenFloat>(period: &SlowPeriod<F>, filter_states: usize) -> Self {
+    fn new<F: Float>(period: &SlowPeriod<F>, filter_states: usize) -> Self {
         let mut next = period.order();
         let mut take = |count: usize| {
             next += count;
@@ -131,7 +131,7 @@ struct LinearMap<F> {
     input: Matrix<F>,
 }
 
-impl<F: ProvenFloat> LinearMap<F> {
+impl<F: Float> LinearMap<F> {
     fn zeros(count: usize, states: usize, inputs: usize) -> Self {
         Self { state: ball::zeros(count, states), input: ball::zeros(count, inputs) }
     }
@@ -155,7 +155,7 @@ impl<F: ProvenFloat> LinearMap<F> {
 
 /// The analog side with its delay lines: xi+ (with `more` rows of zeros below), and the samples that are
 /// counted in this period.
-fn sampled<F: ProvenFloat>(
+fn sampled<F: Float>(
     period: &SlowPeriod<F>,
     layout: &StateRanges,
     more: usize,
@@ -178,10 +178,7 @@ fn sampled<F: ProvenFloat>(
 }
 
 /// The error system of a bank with these filters.
-pub(super) fn error_system<F: ProvenFloat>(
-    period: &SlowPeriod<F>,
-    filters: &BlockForm<F>,
-) -> EnclosedSystem<F> {
+pub(super) fn error_system<F: Float>(period: &SlowPeriod<F>, filters: &BlockForm<F>) -> EnclosedSystem<F> {
     let outputs = filters.d.nrows();
     let layout = StateRanges::new(period, filters.a.nrows());
     let order = layout.order();

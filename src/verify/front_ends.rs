@@ -5,7 +5,7 @@ use super::ball::{self, Ball, Matrix};
 use super::timeline::SamplingInstant;
 use super::{MAX_ANALOG_STATES, MAX_WORK, VerifyError};
 use crate::analog::{Realisation, SignalFilter, StrictlyProper, enclosed, proportion, signal};
-use crate::arithmetic::{LongBall, ProvenFloat};
+use crate::arithmetic::{Float, LongBall};
 use crate::bank::Bank;
 use crate::spec::FilterSpec;
 use crate::units::GridTime;
@@ -128,7 +128,7 @@ impl FrontEnds {
     }
 
     /// a and b.
-    pub(super) fn dynamics<F: ProvenFloat>(&self) -> (Matrix<F>, Matrix<F>) {
+    pub(super) fn dynamics<F: Float>(&self) -> (Matrix<F>, Matrix<F>) {
         let order = self.order();
         let (mut a, mut b) = (ball::zeros(order, order), ball::zeros(order, 1));
         if let Some(signal) = &self.signal {
@@ -151,7 +151,7 @@ impl FrontEnds {
     }
 
     /// The row that reads a sample from the joint state.
-    pub(super) fn output<F: ProvenFloat>(&self, sample: &SamplingInstant) -> Matrix<F> {
+    pub(super) fn output<F: Float>(&self, sample: &SamplingInstant) -> Matrix<F> {
         let FrontEnd { start, equations } = &self.filters[sample.filter];
         let mut row = ball::zeros(1, self.order());
         let gain = Self::gain(sample);

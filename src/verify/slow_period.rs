@@ -10,7 +10,7 @@ use super::ball::{self, Matrix};
 use super::front_ends::FrontEnds;
 use super::state_transition::{EnclosedTransition, state_transition};
 use super::timeline::{SamplingInstant, between, delay_periods};
-use crate::arithmetic::{DoubleDouble, ProvenFloat};
+use crate::arithmetic::{DoubleDouble, Float};
 use crate::units::{GridTime, Timeline};
 
 /// x+ = transition x + w, and for each sample s: s = outputs x + v, counted `delay_periods` slow periods
@@ -27,7 +27,7 @@ pub(super) struct SlowPeriod<F = DoubleDouble> {
     pub(super) delay_periods: Vec<usize>,
 }
 
-impl<F: ProvenFloat> SlowPeriod<F> {
+impl<F: Float> SlowPeriod<F> {
     /// Follows `front_ends` through the period of `timeline` with `samples`.
     pub(super) fn new(front_ends: &FrontEnds, timeline: &Timeline, samples: &[SamplingInstant]) -> Self {
         let (a, b) = front_ends.dynamics();
@@ -64,7 +64,7 @@ impl<F: ProvenFloat> SlowPeriod<F> {
 
 /// Fills the lower triangle beyond the states: the entries of each sample with the samples at the same
 /// instant or later.
-fn correlate<F: ProvenFloat>(
+fn correlate<F: Float>(
     gram: &mut Matrix<F>,
     timeline: &Timeline,
     since_start: &[EnclosedTransition<F>],

@@ -6,7 +6,7 @@
 //! G(2 t) = G(t) + e^{A t} G(t) e^{A' t}. Only sums and products occur.
 
 use super::ball::{self, Ball, Matrix};
-use crate::arithmetic::{DoubleDouble, ProvenFloat};
+use crate::arithmetic::{DoubleDouble, Float};
 
 /// Maximum number of halvings of the time: ||A|| t up to 1e18.
 const MAX_HALVINGS: i32 = 64;
@@ -21,11 +21,7 @@ pub(super) struct EnclosedTransition<F = DoubleDouble> {
 }
 
 /// Encloses both for `dx/dt = a x + b f` after the time `t`.
-pub(super) fn state_transition<F: ProvenFloat>(
-    a: &Matrix<F>,
-    b: &Matrix<F>,
-    t: Ball<F>,
-) -> EnclosedTransition<F> {
+pub(super) fn state_transition<F: Float>(a: &Matrix<F>, b: &Matrix<F>, t: Ball<F>) -> EnclosedTransition<F> {
     let norm = ball::nan_max(ball::row_sum(a), ball::row_sum(&a.transpose()));
     let halvings = halvings(norm * t.magnitude());
     let mut whole = taylor(a, b, t * Ball::from(0.5f64.powi(halvings)), norm);
@@ -43,7 +39,7 @@ fn halvings(size: f64) -> i32 {
 }
 
 /// The series sum_k (A t)^k / k! and sum_k t^k / k! M_k with M_1 = B B', M_{k+1} = A M_k + M_k A'.
-fn taylor<F: ProvenFloat>(a: &Matrix<F>, b: &Matrix<F>, t: Ball<F>, norm: f64) -> EnclosedTransition<F> {
+fn taylor<F: Float>(a: &Matrix<F>, b: &Matrix<F>, t: Ball<F>, norm: f64) -> EnclosedTransition<F> {
     let (n, terms) = (a.nrows(), F::SERIES_TERMS);
     let at = ball::scaled(a, t);
     let inputs = ball::scaled(&ball::product_transposed(b, b), t);

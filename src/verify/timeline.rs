@@ -2,7 +2,7 @@
 
 use super::VerifyError;
 use super::ball::Ball;
-use crate::arithmetic::{LongBall, ProvenFloat};
+use crate::arithmetic::{Float, LongBall};
 use crate::units::{Fraction, GridTime, Timeline};
 
 /// Maximum number of periods by which a sample may be late; the limit keeps the count exact in doubles.
@@ -37,7 +37,7 @@ pub(super) fn delay_periods(timeline: &Timeline) -> Vec<usize> {
 }
 
 /// Encloses the time from `earlier` to `later` in fast periods; exactly zero if they are one.
-pub(super) fn between<F: ProvenFloat>(earlier: GridTime, later: GridTime) -> Ball<F> {
+pub(super) fn between<F: Float>(earlier: GridTime, later: GridTime) -> Ball<F> {
     if earlier == later {
         return Ball::ZERO;
     }

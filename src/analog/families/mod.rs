@@ -15,7 +15,7 @@ pub(super) use elliptic::Selectivity;
 use super::polynomial::isolated;
 use super::roots::{Factors, RootSet};
 use super::{AnalogError, MIN_DAMPING_RATIO};
-use crate::arithmetic::{Ball, ComplexBall, Float512, LongBall, ProvenFloat, elementary};
+use crate::arithmetic::{Ball, ComplexBall, Float, Float512, LongBall, elementary};
 use crate::spec::{Family, MAX_ORDER, Passband, refused};
 use crate::units::Seconds;
 use std::sync::OnceLock;

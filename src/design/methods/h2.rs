@@ -5,7 +5,7 @@ use super::Synthesis;
 use super::filtering::{Innovations, ReferenceFilter};
 use super::gamma_iteration::GammaIteration;
 use super::precise_filtering::PreciseFiltering;
-use crate::arithmetic::{DoubleDouble, Float512, ProvenFloat};
+use crate::arithmetic::{DoubleDouble, Float, Float512};
 use crate::design::DesignError;
 use crate::design::limits::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, Stop};
 use crate::design::plant::LiftedPlant;
@@ -55,10 +55,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, stop: &Stop) -> Result<Synthesis, 
 }
 
 /// The mean-square optimal filter in the precision of `F`, for plants of at most `limit` states.
-fn precise<F: ProvenFloat>(
-    plant: &LiftedPlant,
-    limit: usize,
-) -> Result<Option<ReferenceFilter>, DesignError> {
+fn precise<F: Float>(plant: &LiftedPlant, limit: usize) -> Result<Option<ReferenceFilter>, DesignError> {
     if plant.system().order() > limit {
         return Ok(None);
     }

@@ -5,7 +5,7 @@ use super::filtering::{Innovations, ReferenceFilter, RiccatiSolver, Trial};
 use super::gamma_iteration::{EvaluatedFilters, GammaIteration};
 use super::precise_filtering::PreciseFiltering;
 use super::{MethodSettings, Synthesis};
-use crate::arithmetic::{DoubleDouble, Float512, ProvenFloat};
+use crate::arithmetic::{DoubleDouble, Float, Float512};
 use crate::design::DesignError;
 use crate::design::limits::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS};
 use crate::design::plant::LiftedPlant;
@@ -36,7 +36,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &MethodSettings) -> Resu
 
 /// Goes on in the precision of `F` where the search so far left the optimum open, for plants of at most
 /// `limit` states.
-fn refine<F: ProvenFloat>(
+fn refine<F: Float>(
     plant: &LiftedPlant,
     iteration: &mut GammaIteration<'_>,
     limit: usize,

@@ -21,7 +21,7 @@
 //! whose limit doubling reaches in a few steps.
 
 use super::filtering::{RiccatiSolver, Trial, output_sizes};
-use crate::arithmetic::ProvenFloat;
+use crate::arithmetic::Float;
 use crate::arithmetic::dense::{self, product, riccati_limit, select, solve, symmetric};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
@@ -67,7 +67,7 @@ struct RiccatiStep<F> {
     cross: Matrix<F>,
 }
 
-impl<F: ProvenFloat> PreciseFiltering<F> {
+impl<F: Float> PreciseFiltering<F> {
     pub(super) fn new(plant: &LiftedPlant) -> Result<Self, DesignError> {
         let system = plant.system();
         let measured = plant.channels();
@@ -155,7 +155,7 @@ impl<F: ProvenFloat> PreciseFiltering<F> {
             covariance[(i, i)].nearest().abs() + ZERO_COVARIANCE * self.input_gram[(i, i)].nearest()
         };
         let settled = self.states().all(|i| change(i) <= FIXED_POINT_ACCURACY * size(i));
-        let pivots: Vec<f64> = dense::pivots(&innovation).into_iter().map(ProvenFloat::nearest).collect();
+        let pivots: Vec<f64> = dense::pivots(&innovation).into_iter().map(Float::nearest).collect();
         if !settled || !pivots.iter().all(|pivot| pivot.is_finite()) {
             return None;
         }
@@ -194,7 +194,7 @@ impl<F: ProvenFloat> PreciseFiltering<F> {
     }
 }
 
-impl<F: ProvenFloat> RiccatiSolver for PreciseFiltering<F> {
+impl<F: Float> RiccatiSolver for PreciseFiltering<F> {
     fn h_infinity(&self, gamma: f64) -> Trial {
         let Some(covariance) = self.covariance(Some(gamma)) else { return Trial::Unresolved };
         match self.is_right(&covariance, gamma) {
@@ -206,7 +206,7 @@ impl<F: ProvenFloat> RiccatiSolver for PreciseFiltering<F> {
 }
 
 /// Whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below -[`SEMIDEFINITE`].
-fn is_semidefinite<F: ProvenFloat>(m: &Matrix<F>) -> bool {
+fn is_semidefinite<F: Float>(m: &Matrix<F>) -> bool {
     let kept: Vec<usize> = (0..m.nrows()).filter(|&i| m[(i, i)].nearest() != 0.0).collect();
     if kept.iter().any(|&i| m[(i, i)].nearest() < 0.0) {
         return false;
@@ -219,8 +219,8 @@ fn is_semidefinite<F: ProvenFloat>(m: &Matrix<F>) -> bool {
     dense::cholesky(&scaled).is_some()
 }
 
-fn nearest<F: ProvenFloat>(m: &Matrix<F>) -> Mat {
-    m.map(ProvenFloat::nearest)
+fn nearest<F: Float>(m: &Matrix<F>) -> Mat {
+    m.map(Float::nearest)
 }
 
 #[cfg(test)]

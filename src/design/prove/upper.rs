@@ -8,7 +8,7 @@
 use super::enclosed_norm::EnclosedGains;
 use super::{leading_direction, witness};
 use crate::arithmetic::dense::{cholesky, product, riccati_limit, select, solve, symmetric};
-use crate::arithmetic::{BigFloat, Float512, ProvenFloat};
+use crate::arithmetic::{BigFloat, Float, Float512};
 use crate::bank::{Bank, Certificate, GainWitness};
 use crate::design::DesignError;
 use crate::design::limits::{MAX_LONG_STATES, Stop};
@@ -83,7 +83,7 @@ pub(super) fn certificate(
     {
         (norm, peak_witness) = (gain / units.reference, enclosed);
     }
-    let search = CertificateSearch { error, units: &units, middle: &middle, peak: peak_witness };
+    let search = Certifier { error, units: &units, middle: &middle, peak: peak_witness };
     let level = |excess: &f64| TrialGamma { norm, excess: excess * norm.max(floor) };
     let mut failure = None;
     let mut in_doubles = |excess: &f64| {
@@ -134,7 +134,7 @@ impl TrialGamma {
 }
 
 /// What is certified.
-struct CertificateSearch<'a> {
+struct Certifier<'a> {
     error: &'a EnclosedErrorSystem<'a>,
     units: &'a Units,
     /// The system in these units.
@@ -142,7 +142,7 @@ struct CertificateSearch<'a> {
     peak: GainWitness,
 }
 
-impl CertificateSearch<'_> {
+impl Certifier<'_> {
     /// The certificate of these numbers in units of one, if it proves its gamma.
     fn passes(
         &self,

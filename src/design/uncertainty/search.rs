@@ -42,7 +42,7 @@ pub(in crate::design) struct WorstErrors {
 
 /// A combination with its gain at some frequency.
 #[derive(Debug, Clone)]
-struct WorstCombination {
+struct Attained {
     gain: f64,
     combination: Combination,
 }
@@ -116,7 +116,7 @@ impl BoxSearch {
     /// The refined local maxima of what a sweep found.
     fn peaks_among(
         &self,
-        found: &[Vec<WorstCombination>],
+        found: &[Vec<Attained>],
         filters: &FilterResponse,
         level: f64,
     ) -> Result<Vec<LocatedPeak<Combination>>, DesignError> {
@@ -141,8 +141,8 @@ impl BoxSearch {
 
     /// The combinations found at each frequency, the worst first. Where the gains are below `level` some
     /// frequencies are left out.
-    fn sweep(&self, filters: &FilterResponse, level: f64) -> Result<Vec<Vec<WorstCombination>>, DesignError> {
-        let mut all: Vec<Vec<WorstCombination>> = vec![Vec::new(); self.frequencies.all.len()];
+    fn sweep(&self, filters: &FilterResponse, level: f64) -> Result<Vec<Vec<Attained>>, DesignError> {
+        let mut all: Vec<Vec<Attained>> = vec![Vec::new(); self.frequencies.all.len()];
         let mut carried = vec![vec![0; self.plant.options().len()]];
         for &k in &self.frequencies.first {
             let at = filters.at(self.frequencies.all[k]);
@@ -167,7 +167,7 @@ impl BoxSearch {
     /// Some corners of the box: those of the largest gains among [`BoxPlant::corners`].
     fn worst_corners(&self, response: &BoxResponse, filters: &CMat) -> Result<Vec<Combination>, DesignError> {
         let found = |corner: &Combination| {
-            Ok(WorstCombination { gain: self.gain(response, filters, corner)?, combination: corner.clone() })
+            Ok(Attained { gain: self.gain(response, filters, corner)?, combination: corner.clone() })
         };
         let mut corners = self.corners.iter().map(found).collect::<Result<Vec<_>, DesignError>>()?;
         corners.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -180,8 +180,8 @@ impl BoxSearch {
         starts: Vec<Combination>,
         k: usize,
         filters: &CMat,
-    ) -> Result<Vec<WorstCombination>, DesignError> {
-        let mut all: Vec<WorstCombination> = Vec::new();
+    ) -> Result<Vec<Attained>, DesignError> {
+        let mut all: Vec<Attained> = Vec::new();
         for start in starts {
             let found = climb(&self.plant, self.response(k), filters, start)?;
             if all.iter().all(|known| known.combination != found.combination) {
@@ -196,13 +196,13 @@ impl BoxSearch {
     /// The same from `found`, where no other error of a single channel has a larger gain.
     fn exchanged(
         &self,
-        found: &[WorstCombination],
+        found: &[Attained],
         k: usize,
         filters: &FilterResponse,
-    ) -> Result<Vec<WorstCombination>, DesignError> {
+    ) -> Result<Vec<Attained>, DesignError> {
         let (response, at) = (self.response(k), filters.at(self.frequencies.all[k]));
         let mut starts = Vec::new();
-        for WorstCombination { mut gain, mut combination } in found.iter().cloned() {
+        for Attained { mut gain, mut combination } in found.iter().cloned() {
             for i in 0..combination.len() {
                 let mut best = combination[i];
                 for choice in 0..self.plant.options()[i].len() {
@@ -292,7 +292,7 @@ fn climb(
     response: &BoxResponse,
     filters: &CMat,
     mut combination: Combination,
-) -> Result<WorstCombination, DesignError> {
+) -> Result<Attained, DesignError> {
     let mut gain = 0.0;
     for _ in 0..MAX_STEPS {
         let svd = linalg::svd(&plant.error(response, filters, &combination))?;
@@ -306,16 +306,16 @@ fn climb(
             break;
         }
     }
-    Ok(WorstCombination { gain, combination })
+    Ok(Attained { gain, combination })
 }
 
 /// The largest gain of combinations of which the worst comes first.
-fn highest(found: &[WorstCombination]) -> f64 {
+fn highest(found: &[Attained]) -> f64 {
     found.first().map_or(0.0, |found| found.gain)
 }
 
 /// The first combinations.
-fn combinations(found: &[WorstCombination]) -> Vec<Combination> {
+fn combinations(found: &[Attained]) -> Vec<Combination> {
     found.iter().take(CARRIED).map(|found| found.combination.clone()).collect()
 }
 

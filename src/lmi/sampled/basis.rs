@@ -1,7 +1,7 @@
 //! Orthonormal bases of the range of the taps, for least squares and for dual matrices that are exactly
 //! orthogonal to every tap.
 
-use super::prepare::ReducedProblem;
+use super::prepare::Reduced;
 use crate::linalg::blocks::Batch;
 use crate::linalg::{self, LinalgError, Mat, Svd};
 
@@ -22,11 +22,7 @@ pub(super) struct Basis {
 impl Basis {
     /// `weights[l]` multiplies the row entries at point l.
     /// The taps of original channel i, times `noise[i]`, are further rows whose reference is zero.
-    pub(super) fn new(
-        reduced: &ReducedProblem,
-        weights: Vec<f64>,
-        noise: &[f64],
-    ) -> Result<Self, LinalgError> {
+    pub(super) fn new(reduced: &Reduced, weights: Vec<f64>, noise: &[f64]) -> Result<Self, LinalgError> {
         let map = row_map(reduced, &weights, noise);
         let zero_rows = map.nrows() - 2 * reduced.h.cols() * reduced.count();
         let (l, q) = linalg::lq(&map.transpose());
@@ -62,7 +58,7 @@ impl Basis {
 
     /// Taps of all rows that minimise `sum_l weights_l^2 ||w_l - F h_l||_F^2`, least norm among
     /// directions weaker than `cut` times the strongest.
-    pub(super) fn least_squares(&self, reduced: &ReducedProblem, w: &Batch, cut: f64) -> Vec<f64> {
+    pub(super) fn least_squares(&self, reduced: &Reduced, w: &Batch, cut: f64) -> Vec<f64> {
         let mut x = vec![0.0; reduced.layout.unknowns()];
         for p in 0..reduced.layout.rows {
             let Some(svd) = self.triangle(reduced.layout.lags[p]) else { continue };
@@ -81,7 +77,7 @@ impl Basis {
 
     /// Makes each row of `y` orthogonal to the range of its taps, in two passes for the last digits. Needs a
     /// basis with unit weights.
-    pub(super) fn project_out(&self, reduced: &ReducedProblem, y: &mut Batch, cut: f64) {
+    pub(super) fn project_out(&self, reduced: &Reduced, y: &mut Batch, cut: f64) {
         for p in 0..reduced.layout.rows {
             let Some(svd) = self.triangle(reduced.layout.lags[p]) else { continue };
             let u = svd.u.columns(0, svd.rank(cut));
@@ -98,7 +94,7 @@ impl Basis {
 
 /// Rows: real parts of all (point, input), then imaginary parts, then the noise of all (lag, channel with
 /// noise). Columns: lag by lag, channels inside.
-fn row_map(reduced: &ReducedProblem, weights: &[f64], noise: &[f64]) -> Mat {
+fn row_map(reduced: &Reduced, weights: &[f64], noise: &[f64]) -> Mat {
     let (n, k, lags) = (reduced.layout.channels, reduced.h.cols(), reduced.phases.lags());
     let half = k * reduced.count();
     let noisy: Vec<usize> = (0..noise.len()).filter(|&i| noise[i] > 0.0).collect();

@@ -11,7 +11,7 @@
 //! taps within a stated radius.
 
 use super::basis::Basis;
-use super::prepare::ReducedProblem;
+use super::prepare::Reduced;
 use super::problem::{FrequencyPoint, SampledProblem};
 use crate::linalg::blocks::Batch;
 use crate::linalg::{self, CMat, Complex, LinalgError, Mat};
@@ -102,7 +102,7 @@ fn size(problem: &SampledProblem, taps: &FirMatrix) -> f64 {
 /// multiple of the taps found and of unit gain.
 pub(super) fn cover(
     problem: &SampledProblem,
-    reduced: &ReducedProblem,
+    reduced: &Reduced,
     basis: &Basis,
     (taps, gamma): (&FirMatrix, f64),
 ) -> Result<Coverage, LinalgError> {
@@ -115,7 +115,7 @@ pub(super) fn cover(
 }
 
 /// Largest growth from reduced taps to the size of taps; infinite if channels had to be dropped.
-fn mix_norm(problem: &SampledProblem, reduced: &ReducedProblem) -> Result<f64, LinalgError> {
+fn mix_norm(problem: &SampledProblem, reduced: &Reduced) -> Result<f64, LinalgError> {
     let strength = strengths(problem);
     if reduced.mix.nrows() < strength.iter().filter(|s| **s > 0.0).count() {
         return Ok(f64::INFINITY);
@@ -130,7 +130,7 @@ fn mix_norm(problem: &SampledProblem, reduced: &ReducedProblem) -> Result<f64, L
 /// inputs is `Z11 K / gamma`, a subgradient. Its first part is made orthogonal to all taps.
 pub(super) fn from_iterate(
     problem: &SampledProblem,
-    reduced: &ReducedProblem,
+    reduced: &Reduced,
     basis: &Basis,
     z: &Batch,
     coverage: Coverage,
@@ -143,7 +143,7 @@ pub(super) fn from_iterate(
     Ok(LowerBound { value, covers_all: coverage.is_all })
 }
 
-fn dual_matrices(reduced: &ReducedProblem, basis: &Basis, z: &Batch, cut: f64) -> Vec<CMat> {
+fn dual_matrices(reduced: &Reduced, basis: &Basis, z: &Batch, cut: f64) -> Vec<CMat> {
     let (m, k1, k2) = (reduced.layout.rows, reduced.h.cols(), reduced.w_rest.cols());
     let mut image = Batch::zeros(z.count(), m, k1);
     for l in 0..z.count() {

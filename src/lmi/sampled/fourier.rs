@@ -70,14 +70,14 @@ impl LagPhasors {
 
 /// Which unknown is which tap: row p owns `channels * lags[p]` consecutive unknowns, lag by lag.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct TapLayout {
+pub(super) struct Layout {
     pub(super) rows: usize,
     pub(super) channels: usize,
     pub(super) lags: Vec<usize>,
     offsets: Vec<usize>,
 }
 
-impl TapLayout {
+impl Layout {
     pub(super) fn new(channels: usize, lags: &[usize]) -> Self {
         let mut offsets = vec![0];
         for (p, j) in lags.iter().enumerate() {
@@ -108,7 +108,7 @@ impl TapLayout {
         x
     }
 
-    /// The inverse of [`TapLayout::gather`], zero where there is no unknown.
+    /// The inverse of [`Layout::gather`], zero where there is no unknown.
     pub(super) fn scatter(&self, x: &[f64]) -> Mat {
         let lags = self.lags.iter().copied().max().unwrap_or(0);
         let mut c = Mat::zeros(self.rows * self.channels, lags);

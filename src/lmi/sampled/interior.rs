@@ -6,7 +6,7 @@
 
 use super::blocks::{Cone, SlackStep};
 use super::newton::{self, ChannelProjection};
-use super::prepare::ReducedProblem;
+use super::prepare::Reduced;
 use super::quadratic::Quadratic;
 use crate::linalg::Mat;
 use crate::linalg::blocks::Batch;
@@ -29,7 +29,7 @@ const STARTING_GAP: f64 = 0.1;
 
 /// The iterate.
 pub(super) struct InteriorIterate<'a> {
-    reduced: &'a ReducedProblem,
+    reduced: &'a Reduced,
     objective: Objective,
     /// The unknown taps in reduced coordinates.
     pub(super) x: Vec<f64>,
@@ -47,7 +47,7 @@ struct NewtonDirection {
 impl<'a> InteriorIterate<'a> {
     /// Starts at the taps `x` with `t`, which must be above every `sigma_max(K_l)^2`; `None` otherwise.
     pub(super) fn new(
-        reduced: &'a ReducedProblem,
+        reduced: &'a Reduced,
         objective: Objective,
         x: Vec<f64>,
         t: f64,
@@ -114,7 +114,7 @@ impl<'a> InteriorIterate<'a> {
     }
 
     fn newton(&self) -> Option<RegularisedCholesky> {
-        let ReducedProblem { h, layout, phases, .. } = self.reduced;
+        let Reduced { h, layout, phases, .. } = self.reduced;
         let taps = self.x.len();
         let order = taps + usize::from(self.free_t());
         let mut matrix = match &self.curvature {

@@ -6,7 +6,7 @@
 
 use super::basis::Basis;
 use super::interior::{InteriorIterate, Objective};
-use super::prepare::ReducedProblem;
+use super::prepare::Reduced;
 use super::problem::{FrequencyPoint, MeanSquareObjective, SampledProblem};
 use super::quadratic::Quadratic;
 use crate::linalg::LinalgError;
@@ -41,7 +41,7 @@ pub(crate) fn least_squares(
     square: &MeanSquareObjective,
     tol_rank: f64,
 ) -> Result<FirMatrix, LinalgError> {
-    let reduced = ReducedProblem::new(problem)?;
+    let reduced = Reduced::new(problem)?;
     if reduced.layout.unknowns() == 0 {
         return Ok(problem.zero_taps());
     }
@@ -77,7 +77,7 @@ pub fn mean_square_under_cap(
     }
     // From the start, in units of the cap and of the start's own mean square.
     let unit = best.mean_square / (cap * cap);
-    let mut reduced = ReducedProblem::new(&residual_problem(problem, start))?;
+    let mut reduced = Reduced::new(&residual_problem(problem, start))?;
     reduced.rescale(cap);
     let quadratic = Quadratic::new(&reduced, square, start, cap, unit);
     let zero = vec![0.0; reduced.layout.unknowns()];

@@ -8,8 +8,8 @@
 //!  + e^{-i w (j+j')} ( Xvu[i,p'] Zvu[i',p] + Xvu[i',p] Zvu[i,p'] ).
 //! ```
 
-use super::fourier::{LagPhasors, TapLayout};
-use super::prepare::ReducedProblem;
+use super::fourier::{LagPhasors, Layout};
+use super::prepare::Reduced;
 use crate::linalg::blocks::{Batch, BatchView, inner};
 use crate::linalg::{Complex, Mat};
 
@@ -49,7 +49,7 @@ fn copy(from: BatchView<'_>, to: &mut [Complex<f64>]) {
 /// Adds the tap-tap part to the lower triangle of `matrix`.
 pub(super) fn add_taps(
     matrix: &mut Mat,
-    layout: &TapLayout,
+    layout: &Layout,
     phases: &LagPhasors,
     x: &ChannelProjection,
     z: &ChannelProjection,
@@ -97,11 +97,7 @@ fn put(data: &mut Mat, r: usize, l: usize, count: usize, z: Complex<f64>) {
 
 /// Row and corner of the unknown t: `-Re sum_l e^{-i w j} (Xvu Zuu + Zvu Xuu)_{i,p}` and
 /// `Re sum_l tr(Xuu Zuu)`.
-pub(super) fn border(
-    reduced: &ReducedProblem,
-    x: &ChannelProjection,
-    z: &ChannelProjection,
-) -> (Vec<f64>, f64) {
+pub(super) fn border(reduced: &Reduced, x: &ChannelProjection, z: &ChannelProjection) -> (Vec<f64>, f64) {
     let (n, m) = (reduced.layout.channels, reduced.layout.rows);
     let mut mixed = Batch::zeros(1, n, m);
     let mut e = Batch::zeros(reduced.count(), m, n);
@@ -121,7 +117,7 @@ pub(super) fn border(
 /// the weighted mean square.
 pub(super) fn add_mean_square(
     matrix: &mut Mat,
-    layout: &TapLayout,
+    layout: &Layout,
     phases: &LagPhasors,
     h: &Batch,
     weights: &[f64],
@@ -140,13 +136,7 @@ pub(super) fn add_mean_square(
     }
 }
 
-fn add_toeplitz(
-    matrix: &mut Mat,
-    layout: &TapLayout,
-    phases: &LagPhasors,
-    (p, p2): (usize, usize),
-    data: &Mat,
-) {
+fn add_toeplitz(matrix: &mut Mat, layout: &Layout, phases: &LagPhasors, (p, p2): (usize, usize), data: &Mat) {
     let n = layout.channels;
     let (jp, jp2) = (layout.lags[p], layout.lags[p2]);
     let (even, odd) = phases.split_sum(data, jp.max(jp2));
@@ -158,13 +148,7 @@ fn add_toeplitz(
     assert_eq!(data.nrows(), n * n);
 }
 
-fn add_hankel(
-    matrix: &mut Mat,
-    layout: &TapLayout,
-    phases: &LagPhasors,
-    (p, p2): (usize, usize),
-    data: &Mat,
-) {
+fn add_hankel(matrix: &mut Mat, layout: &Layout, phases: &LagPhasors, (p, p2): (usize, usize), data: &Mat) {
     let lags = (layout.lags[p] + layout.lags[p2]).max(1) - 1;
     let sums = phases.sum(data, lags);
     each_pair(layout, (p, p2), |row, col, j, j2, r| matrix[(row, col)] += sums[(r, j + j2)]);
@@ -172,7 +156,7 @@ fn add_hankel(
 
 /// All unknowns of row `p` against all of row `p2`; `r` is the entry i + n i' of the pair of channels.
 fn each_pair(
-    layout: &TapLayout,
+    layout: &Layout,
     (p, p2): (usize, usize),
     mut visit: impl FnMut(usize, usize, usize, usize, usize),
 ) {

@@ -1,7 +1,7 @@
 //! The problem of the iteration: inputs compressed at each point, channels mixed to equal strength without
 //! correlation.
 
-use super::fourier::{LagPhasors, TapLayout};
+use super::fourier::{LagPhasors, Layout};
 use super::problem::SampledProblem;
 use crate::linalg::blocks::Batch;
 use crate::linalg::{self, CMat, LinalgError, Mat};
@@ -13,7 +13,7 @@ const CHANNEL_RANK: f64 = 1e-14;
 
 /// The problem in well-conditioned coordinates.
 #[derive(Debug, Clone)]
-pub(super) struct ReducedProblem {
+pub(super) struct Reduced {
     /// Mixed channels, n x k1.
     pub(super) h: Batch,
     /// The reference in the inputs that the channels measure, M x k1.
@@ -26,11 +26,11 @@ pub(super) struct ReducedProblem {
     pub(super) inputs: Vec<CMat>,
     /// n x N: `H_l Q_l* = ` original channels, mixed by `mix`; taps = reduced taps times `mix`.
     pub(super) mix: Mat,
-    pub(super) layout: TapLayout,
+    pub(super) layout: Layout,
     pub(super) phases: LagPhasors,
 }
 
-impl ReducedProblem {
+impl Reduced {
     pub(super) fn new(problem: &SampledProblem) -> Result<Self, LinalgError> {
         let (m, n, q) = (problem.rows(), problem.channels(), problem.inputs());
         let count = problem.points().len();
@@ -50,7 +50,7 @@ impl ReducedProblem {
         let h = mixed(&channels, &mix);
         let g = gram(&w_rest);
         let omega: Vec<f64> = problem.points().iter().map(|p| p.omega).collect();
-        let layout = TapLayout::new(mix.nrows(), problem.lags());
+        let layout = Layout::new(mix.nrows(), problem.lags());
         let phases = LagPhasors::new(&omega, problem.max_lags());
         Ok(Self { h, w, w_rest, g, inputs, mix, layout, phases })
     }
@@ -78,7 +78,7 @@ impl ReducedProblem {
     }
 
     /// `2 Re sum_l e^{i omega_l j} (y_l h_l*)_{p,i}` for all unknowns: the adjoint of
-    /// [`ReducedProblem::image`] for the inner product `2 Re sum tr(y* k)`.
+    /// [`Reduced::image`] for the inner product `2 Re sum tr(y* k)`.
     pub(super) fn adjoint(&self, y: &Batch) -> Vec<f64> {
         let mut e = Batch::zeros(self.count(), self.layout.rows, self.layout.channels);
         for l in 0..self.count() {

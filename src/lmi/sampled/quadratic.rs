@@ -5,7 +5,7 @@
 //! of the noise.
 
 use super::newton;
-use super::prepare::ReducedProblem;
+use super::prepare::Reduced;
 use super::problem::MeanSquareObjective;
 use crate::linalg::Mat;
 use crate::linalg::blocks::Batch;
@@ -26,7 +26,7 @@ pub(super) struct Quadratic {
 impl Quadratic {
     /// `square` about `start`, the taps in units of `cap`, the objective in units of `unit cap^2`.
     pub(super) fn new(
-        reduced: &ReducedProblem,
+        reduced: &Reduced,
         square: &MeanSquareObjective,
         start: &FirMatrix,
         cap: f64,
@@ -58,7 +58,7 @@ impl Quadratic {
     }
 
     /// Its derivative in the unknowns.
-    pub(super) fn gradient(&self, reduced: &ReducedProblem, k: &Batch, x: &[f64]) -> Vec<f64> {
+    pub(super) fn gradient(&self, reduced: &Reduced, k: &Batch, x: &[f64]) -> Vec<f64> {
         let mut weighted = k.clone();
         let size = weighted.rows() * weighted.cols();
         for (i, z) in weighted.as_mut_slice().iter_mut().enumerate() {
@@ -70,7 +70,7 @@ impl Quadratic {
     }
 
     /// Its second derivative (lower triangle).
-    pub(super) fn curvature(&self, reduced: &ReducedProblem) -> Mat {
+    pub(super) fn curvature(&self, reduced: &Reduced) -> Mat {
         let unknowns = reduced.layout.unknowns();
         let mut q = Mat::zeros(unknowns, unknowns);
         newton::add_mean_square(&mut q, &reduced.layout, &reduced.phases, &reduced.h, &self.weights);

@@ -3,7 +3,7 @@
 use super::basis::Basis;
 use super::bound::{self, LowerBound};
 use super::interior::{InteriorIterate, Objective, norm};
-use super::prepare::ReducedProblem;
+use super::prepare::Reduced;
 use super::problem::SampledProblem;
 use crate::linalg::LinalgError;
 use crate::lmi::IsDue;
@@ -42,13 +42,13 @@ pub fn minimise(
     tol_gap_rel: f64,
     is_due: IsDue<'_>,
 ) -> Result<Solution, LinalgError> {
-    let mut reduced = ReducedProblem::new(problem)?;
+    let mut reduced = Reduced::new(problem)?;
     if reduced.layout.unknowns() == 0 {
         return fixed(problem);
     }
     let basis = Basis::new(&reduced, vec![1.0; reduced.count()], &[])?;
     let x = basis.least_squares(&reduced, &reduced.w, RANK_TOLERANCE);
-    let best = BestWorstCase::new(problem, reduced.taps(&x))?;
+    let best = LeastGamma::new(problem, reduced.taps(&x))?;
     if best.relative_gap() <= tol_gap_rel {
         return Ok(best.finish(true, 0));
     }
@@ -78,7 +78,7 @@ fn fixed(problem: &SampledProblem) -> Result<Solution, LinalgError> {
     Ok(Solution { is_solved: true, taps, gamma, lower, iterations: 0 })
 }
 
-struct BestWorstCase {
+struct LeastGamma {
     /// Gap that counts as zero.
     floor: f64,
     taps: FirMatrix,
@@ -86,7 +86,7 @@ struct BestWorstCase {
     lower: LowerBound,
 }
 
-impl BestWorstCase {
+impl LeastGamma {
     fn new(problem: &SampledProblem, taps: FirMatrix) -> Result<Self, LinalgError> {
         let gamma = problem.worst(&taps)?;
         let floor = GAP_OF_ZERO * problem.worst(&problem.zero_taps())?;
@@ -107,12 +107,12 @@ impl BestWorstCase {
 /// The iteration, and what it has found.
 struct WorstCaseIteration<'a> {
     problem: &'a SampledProblem,
-    reduced: &'a ReducedProblem,
+    reduced: &'a Reduced,
     basis: &'a Basis,
     start: Vec<f64>,
     scale: f64,
     engine: InteriorIterate<'a>,
-    best: BestWorstCase,
+    best: LeastGamma,
 }
 
 impl WorstCaseIteration<'_> {
