@@ -22,15 +22,8 @@ const BRACKET_SHARE: f64 = 0.5;
 const ZERO_GAMMA: f64 = 1e-12;
 /// The bracket halves (on the logarithmic scale) in each trial.
 const TRIAL_LIMIT: usize = 80;
-/// Number of smaller gammas that are tried after an unresolved one.
-const TRIALS_BELOW: usize = 8;
-/// Limit on the number of gamma-iterations; trials at smaller gammas come between them.
-const ROUND_LIMIT: usize = 4;
 /// Relative distance below the least gamma found at which a more precise solver must find no filter.
 const CONFIRMED_BELOW: f64 = 2e-6;
-/// Another gamma-iteration follows if the trials at smaller gammas reduced gamma to less than this
-/// fraction.
-const WORTHWHILE_REDUCTION: f64 = 0.9;
 
 /// Filters with the norm of their error system.
 #[derive(Debug, Clone)]
@@ -179,40 +172,8 @@ impl<'a> GammaIteration<'a> {
         Ok(())
     }
 
-    /// Gamma-iteration, and a few trials at smaller gammas after an unresolved trial: near the limits of
-    /// double precision a smaller gamma may be solvable.
+    /// Halves the bracket until it is narrow. A gamma that is not resolved counts as too small.
     pub(super) fn bisect(&mut self) -> Result<(), DesignError> {
-        for _ in 0..ROUND_LIMIT {
-            if self.bisect_once()? {
-                break;
-            }
-            let before = self.upper();
-            self.try_below()?;
-            // Also false if nothing was found.
-            let gained = self.upper() < WORTHWHILE_REDUCTION * before;
-            if !gained {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    fn try_below(&mut self) -> Result<(), DesignError> {
-        let start = self.ceiling()?;
-        let ratio = self.floor() / start;
-        for k in 1..=TRIALS_BELOW {
-            let gamma = start * ratio.powf(k as f64 / (TRIALS_BELOW + 1) as f64);
-            if matches!(self.attempt_or_exclude(gamma)?, Trial::Impossible) {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether the lower end of the last bracket is a gamma that no filter achieves: else the trial there
-    /// was not resolved.
-    fn bisect_once(&mut self) -> Result<bool, DesignError> {
-        let mut is_impossible = true;
         let (mut floor, mut ceiling) = (self.floor(), self.ceiling()?);
         for _ in 0..TRIAL_LIMIT {
             if self.done() || ceiling <= floor * (1.0 + BRACKET_SHARE * GAMMA_ACCURACY) {
@@ -221,11 +182,10 @@ impl<'a> GammaIteration<'a> {
             let gamma = (floor * ceiling).sqrt();
             match self.attempt_or_exclude(gamma)? {
                 Trial::Achieved(_) => ceiling = gamma.min(self.upper()),
-                Trial::Impossible => (floor, is_impossible) = (gamma, true),
-                Trial::Unresolved => (floor, is_impossible) = (gamma, false),
+                Trial::Impossible | Trial::Unresolved => floor = gamma,
             }
         }
-        Ok(is_impossible)
+        Ok(())
     }
 
     /// As [`GammaIteration::attempt`]; a gamma that no filter achieves raises the lower bound.
