@@ -177,7 +177,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 /// The design of a spec. Its time limit and the first interrupt end it with what it has.
 fn designed(args: &Args, spec: &Spec) -> Result<Design, Failure> {
     let time_limit = (!args.no_limit).then_some(TIME_LIMIT);
-    let watch = Watch {
+    let watch = DesignWatch {
         stop: Stop::default(),
         interrupts: interrupts(),
         limit: time_limit.map(|limit| limit + PATIENCE),
@@ -217,7 +217,7 @@ const LOOK: Duration = Duration::from_millis(125);
 const LINE: Duration = Duration::from_secs(30);
 
 /// Follows a design: shows what it does, ends it at an interrupt, and gives it up long after its limit.
-struct Watch<'a> {
+struct DesignWatch<'a> {
     stop: Stop,
     interrupts: Receiver<()>,
     limit: Option<Duration>,
@@ -226,7 +226,7 @@ struct Watch<'a> {
     stage: Mutex<Option<Stage>>,
 }
 
-impl Watch<'_> {
+impl DesignWatch<'_> {
     /// The step that begins.
     fn note(&self, stage: Stage) {
         *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = Some(stage);
@@ -286,8 +286,8 @@ impl Watch<'_> {
 mod tests {
     use super::*;
 
-    fn watch<'a>(limit: Option<Duration>, give_up: &'a (dyn Fn() + Sync)) -> Watch<'a> {
-        Watch {
+    fn watch<'a>(limit: Option<Duration>, give_up: &'a (dyn Fn() + Sync)) -> DesignWatch<'a> {
+        DesignWatch {
             stop: Stop::default(),
             interrupts: crossbeam_channel::never(),
             limit,
@@ -322,7 +322,7 @@ mod tests {
     #[test]
     fn an_interrupt_stops_the_design() {
         let (interrupt, interrupts) = bounded(1);
-        let watch = Watch { interrupts, ..watch(None, &|| ()) };
+        let watch = DesignWatch { interrupts, ..watch(None, &|| ()) };
         let begin = Instant::now();
         watch.during(|| {
             interrupt.send(()).unwrap();

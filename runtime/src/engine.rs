@@ -15,15 +15,15 @@ use std::sync::Arc;
 /// A filter with its state, in the number type of its sums.
 #[derive(Debug, Clone)]
 pub(crate) enum Engine {
-    F32(FirAlgorithm<f32>),
-    F64(FirAlgorithm<f64>),
+    F32(Fir<f32>),
+    F64(Fir<f64>),
     /// A recursion feeds its rounding errors back: always in f64.
     Recursive(StatefulFilter<Recursive>),
 }
 
 /// One of the algorithms for FIR filters.
 #[derive(Debug, Clone)]
-pub(crate) enum FirAlgorithm<T: Sample> {
+pub(crate) enum Fir<T: Sample> {
     Direct(StatefulFilter<Direct<T>>),
     OverlapSave(StatefulFilter<OverlapSave<T>>),
 }
@@ -39,10 +39,10 @@ pub(crate) struct StatefulFilter<F: Filter> {
 macro_rules! each {
     ($engine:expr, $it:ident => $body:expr) => {
         match $engine {
-            Engine::F32(FirAlgorithm::Direct($it)) => $body,
-            Engine::F32(FirAlgorithm::OverlapSave($it)) => $body,
-            Engine::F64(FirAlgorithm::Direct($it)) => $body,
-            Engine::F64(FirAlgorithm::OverlapSave($it)) => $body,
+            Engine::F32(Fir::Direct($it)) => $body,
+            Engine::F32(Fir::OverlapSave($it)) => $body,
+            Engine::F64(Fir::Direct($it)) => $body,
+            Engine::F64(Fir::OverlapSave($it)) => $body,
             Engine::Recursive($it) => $body,
         }
     };
@@ -74,8 +74,8 @@ impl Engine {
     ) -> u64 {
         use crate::parallel::process;
         match self {
-            Self::F32(FirAlgorithm::Direct(it)) => process(&*it.filter, &mut it.state, input, output, pool),
-            Self::F64(FirAlgorithm::Direct(it)) => process(&*it.filter, &mut it.state, input, output, pool),
+            Self::F32(Fir::Direct(it)) => process(&*it.filter, &mut it.state, input, output, pool),
+            Self::F64(Fir::Direct(it)) => process(&*it.filter, &mut it.state, input, output, pool),
             _ => self.process(input, output),
         }
     }

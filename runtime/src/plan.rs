@@ -3,7 +3,7 @@
 use crate::adapters::Offsets;
 use crate::algorithms::choice::{ChosenAlgorithm, check_recursive};
 use crate::algorithms::{AlgorithmFacts, Direct, OverlapSave, Recursive};
-use crate::engine::{Engine, FirAlgorithm, StatefulFilter};
+use crate::engine::{Engine, Fir, StatefulFilter};
 use crate::state::Digest;
 use crate::{Algorithm, BuildError, Isa, Precision, Sample, Shape, StateMatrices};
 use std::sync::Arc;
@@ -226,16 +226,11 @@ impl Plan {
 }
 
 impl ChosenAlgorithm {
-    fn filter<T: Sample>(
-        self,
-        taps: &[Vec<f64>],
-        ratio: usize,
-        isa: Isa,
-    ) -> Result<FirAlgorithm<T>, BuildError> {
+    fn filter<T: Sample>(self, taps: &[Vec<f64>], ratio: usize, isa: Isa) -> Result<Fir<T>, BuildError> {
         Ok(match self {
-            Self::Direct => FirAlgorithm::Direct(StatefulFilter::new(Direct::new(taps, ratio, isa)?)),
+            Self::Direct => Fir::Direct(StatefulFilter::new(Direct::new(taps, ratio, isa)?)),
             Self::OverlapSave(shape) => {
-                FirAlgorithm::OverlapSave(StatefulFilter::new(OverlapSave::new(taps, shape, isa)?))
+                Fir::OverlapSave(StatefulFilter::new(OverlapSave::new(taps, shape, isa)?))
             }
         })
     }

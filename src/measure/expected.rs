@@ -1,6 +1,6 @@
 //! The lines that theory expects: their causes, their frequencies, and which of them coincide.
 
-use crate::sine_fit::{RotationSense, alias};
+use crate::sine_fit::{Sense, alias};
 use std::fmt;
 
 /// The cause of a spur. Tones count from 1; 0 stands for the only tone.
@@ -109,8 +109,8 @@ pub(super) struct ExpectedLine {
 }
 
 impl ExpectedLine {
-    pub(super) fn causes(&self, direction: RotationSense) -> &[Cause] {
-        if direction == RotationSense::Forward { &self.forward } else { &self.backward }
+    pub(super) fn causes(&self, direction: Sense) -> &[Cause] {
+        if direction == Sense::Forward { &self.forward } else { &self.backward }
     }
 }
 
@@ -126,7 +126,7 @@ pub(super) struct Expected {
 }
 
 /// Which lines are expected.
-pub(super) struct ExpectedLines<'a> {
+pub(super) struct Pattern<'a> {
     /// Frequencies of the tones in cycles per sample; those of a complex record may be negative.
     pub(super) tones: &'a [f64],
     /// Complex records tell a frequency from its negative, and hold an image there of whatever they hold.
@@ -141,7 +141,7 @@ pub(super) struct ExpectedLines<'a> {
 
 impl Expected {
     /// All lines of a pattern. Where lines coincide, harmonics come first, then offsets, then images.
-    pub(super) fn of(pattern: &ExpectedLines<'_>) -> Self {
+    pub(super) fn of(pattern: &Pattern<'_>) -> Self {
         let mut expected = Self::default();
         expected.add_harmonics(pattern);
         expected.add_intermodulation(pattern);
@@ -157,7 +157,7 @@ impl Expected {
         expected
     }
 
-    fn add_harmonics(&mut self, pattern: &ExpectedLines<'_>) {
+    fn add_harmonics(&mut self, pattern: &Pattern<'_>) {
         for (tone, f) in pattern.tones.iter().enumerate() {
             let f = if pattern.is_complex { *f } else { f.abs() };
             for order in 2..=pattern.harmonics {
@@ -168,7 +168,7 @@ impl Expected {
         }
     }
 
-    fn add_intermodulation(&mut self, pattern: &ExpectedLines<'_>) {
+    fn add_intermodulation(&mut self, pattern: &Pattern<'_>) {
         for (j, g) in pattern.tones.iter().enumerate() {
             for (i, f) in pattern.tones[..j].iter().enumerate() {
                 for (a, b) in [(1, 1), (1, -1), (2, 1), (2, -1), (1, 2), (-1, 2)] {
@@ -180,7 +180,7 @@ impl Expected {
         }
     }
 
-    fn add_offsets(&mut self, pattern: &ExpectedLines<'_>) {
+    fn add_offsets(&mut self, pattern: &Pattern<'_>) {
         let of = pattern.converters;
         // No sine can be fitted there, so that it is never found among the unexpected lines.
         self.half_rate = Some(Cause::Unknown);
@@ -195,7 +195,7 @@ impl Expected {
     }
 
     /// Adds a line at the alias of `cycles`, or to the one that is there: its cause, and that of its image.
-    fn add(&mut self, pattern: &ExpectedLines<'_>, cycles: f64, [cause, image]: [Cause; 2]) {
+    fn add(&mut self, pattern: &Pattern<'_>, cycles: f64, [cause, image]: [Cause; 2]) {
         let folded = alias(cycles);
         let is_near = |other: f64| (folded - other).abs() < pattern.resolution;
         if is_near(0.0) || is_near(0.5) || pattern.tones.iter().any(|f| is_near(alias(*f))) {
@@ -215,14 +215,14 @@ impl Expected {
     }
 
     /// True for a frequency within the resolution of a tone or of an expected line.
-    pub(super) fn holds(&self, pattern: &ExpectedLines<'_>, cycles: f64) -> bool {
+    pub(super) fn holds(&self, pattern: &Pattern<'_>, cycles: f64) -> bool {
         let tones = pattern.tones.iter().map(|f| alias(*f));
         let mut all = self.lines.iter().map(|line| line.cycles).chain(tones);
         all.any(|other| (cycles - other).abs() < pattern.resolution)
     }
 }
 
-impl ExpectedLines<'_> {
+impl Pattern<'_> {
     /// What messages call a tone: 0 for the only one.
     pub(super) fn number(&self, tone: usize) -> usize {
         if self.tones.len() == 1 { 0 } else { tone + 1 }
@@ -252,7 +252,7 @@ fn image(f: f64, k: usize, of: usize, tone: usize) -> Cause {
 
 /// The cause of a line that was found at `cycles` beside the expected ones. What the fit of a line leaves,
 /// because it is not steady, is unknown.
-pub(super) fn unexpected(pattern: &ExpectedLines<'_>, expected: &Expected, cycles: f64) -> Cause {
+pub(super) fn unexpected(pattern: &Pattern<'_>, expected: &Expected, cycles: f64) -> Cause {
     let of = pattern.converters;
     let [f] = pattern.tones else { return Cause::Unknown };
     if expected.holds(pattern, alias(cycles)) {

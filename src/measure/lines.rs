@@ -1,9 +1,9 @@
 //! The amplitudes of lines, and what is left without them.
 
-use super::expected::{Expected, ExpectedLines, unexpected};
+use super::expected::{Expected, Pattern, unexpected};
 use super::record::RecordParts;
 use super::{Cause, MeasureError};
-use crate::sine_fit::{RotationSense, SineFit, alias, find_tones, fit, fit_known};
+use crate::sine_fit::{Sense, SineFit, alias, find_tones, fit, fit_known};
 use crate::units::{Decibels, Hertz};
 use std::f64::consts::SQRT_2;
 
@@ -48,7 +48,7 @@ pub(super) fn fit_lines(
     record: &RecordParts<'_>,
     tones: &SineFit,
     expected: &Expected,
-    pattern: &ExpectedLines<'_>,
+    pattern: &Pattern<'_>,
 ) -> Result<Lines, MeasureError> {
     let used = record.used();
     let lines = tones.frequencies.len() + expected.lines.len();
@@ -132,17 +132,12 @@ impl Together {
     }
 
     /// The expected lines, and in complex records the images of the tones.
-    fn found(
-        &self,
-        record: &RecordParts<'_>,
-        pattern: &ExpectedLines<'_>,
-        expected: &Expected,
-    ) -> Vec<FoundLine> {
+    fn found(&self, record: &RecordParts<'_>, pattern: &Pattern<'_>, expected: &Expected) -> Vec<FoundLine> {
         let (rate, tones) = (self.fit.rate, pattern.tones.len());
         let tones_of_images = (0..tones).filter(|_| pattern.is_complex);
         let images = tones_of_images.map(|k| FoundLine {
             frequency: rate * -pattern.seen(pattern.tones[k]),
-            amplitude: record.amplitude(&self.fit, k, RotationSense::Backward),
+            amplitude: record.amplitude(&self.fit, k, Sense::Backward),
             causes: vec![Cause::Image { order: 1, tone: pattern.number(k) }],
         });
         let lines = expected.lines.iter().enumerate().flat_map(|(k, line)| {
@@ -192,12 +187,7 @@ struct Unexpected {
 impl Unexpected {
     /// Fits and subtracts the largest lines of the rest, one after the other; those of complex records with
     /// what is at minus their frequency.
-    fn search(
-        rest: &RecordParts<'static>,
-        rate: Hertz,
-        pattern: &ExpectedLines<'_>,
-        expected: &Expected,
-    ) -> Self {
+    fn search(rest: &RecordParts<'static>, rate: Hertz, pattern: &Pattern<'_>, expected: &Expected) -> Self {
         let waves = rest.map(|_, part| vec![0.0; part.len()]);
         let mut all = Self { found: Vec::new(), waves, largest: 0.0, rest: rest.clone() };
         for _ in 0..MOST_UNEXPECTED {

@@ -1,11 +1,11 @@
 //! The figures of a record with tones.
 
-use super::expected::{Expected, ExpectedLines};
+use super::expected::{Expected, Pattern};
 use super::lines::{FoundLine, Lines, fit_lines};
 use super::record::{Quadrature, RecordParts, UnsettledEnds};
 use super::{Cause, MeasureError, RecordSpectrum, Settings, Window};
 use crate::sine_fit::SineFitError::{AtEdge, NoTone, TonesCoincide};
-use crate::sine_fit::{Estimate, RotationSense, SineFit, ToneFit, find_tones, fit, locate, with_lines};
+use crate::sine_fit::{Estimate, Sense, SineFit, ToneFit, find_tones, fit, locate, with_lines};
 use crate::units::{Decibels, Hertz, Radians};
 
 /// A tone that is given may be this far from the true one, in cycles per sample ..
@@ -171,7 +171,7 @@ fn measured(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Resul
 fn figures(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
     let tones = fit_tones(record, rate, settings)?;
     let cycles: Vec<f64> = tones.frequencies.iter().map(|f| f.value / rate).collect();
-    let pattern = ExpectedLines {
+    let pattern = Pattern {
         tones: &cycles,
         is_complex: record.is_complex(),
         converters: settings.converters,
@@ -193,7 +193,7 @@ fn fit_tones(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Resu
         .map_err(|error| with_lines(error, &channels, rate))?;
     let size = |direction| record.amplitude(&found, 0, direction);
     let is_given = !settings.tones.is_empty() || !record.is_complex();
-    if is_given || size(RotationSense::Forward) >= size(RotationSense::Backward) {
+    if is_given || size(Sense::Forward) >= size(Sense::Backward) {
         return Ok(found);
     }
     Ok(fit(&channels, rate, &[-found.frequencies[0].value])?)
@@ -220,7 +220,7 @@ fn spectrum(record: &RecordParts<'_>, rate: Hertz, window: Window) -> RecordSpec
 /// What the figures are computed from.
 struct FigureSources<'a> {
     record: &'a RecordParts<'a>,
-    pattern: &'a ExpectedLines<'a>,
+    pattern: &'a Pattern<'a>,
     tones: &'a SineFit,
     lines: &'a Lines,
     /// The spectrum of what is left without lines.
@@ -278,7 +278,7 @@ impl FigureSources<'_> {
 
     /// The tone k: the sine, or the exponential of a complex record.
     fn tone(&self, k: usize) -> ToneFit {
-        self.tones.phasor(self.record.wave(RotationSense::Forward), k)
+        self.tones.phasor(self.record.wave(Sense::Forward), k)
     }
 
     fn amplitudes(&self) -> impl Iterator<Item = f64> {
@@ -289,7 +289,7 @@ impl FigureSources<'_> {
     fn other_power(&self) -> f64 {
         let parts = self.tones.channels.iter().map(|part| part.residual_rms.powi(2));
         let rest = parts.sum::<f64>() / self.tones.channels.len() as f64;
-        let image = |k| 0.5 * self.record.amplitude(self.tones, k, RotationSense::Backward).powi(2);
+        let image = |k| 0.5 * self.record.amplitude(self.tones, k, Sense::Backward).powi(2);
         let images = (0..self.tones.tones()).filter(|_| self.record.is_complex()).map(image);
         rest + images.sum::<f64>()
     }

@@ -1,6 +1,6 @@
 //! Real and complex records, their ends, and what the parts of complex ones lack of quadrature.
 
-use crate::sine_fit::{Channel, Component, Estimate, Ratio, RotationSense, SineFit};
+use crate::sine_fit::{Channel, Component, Estimate, Ratio, Sense, SineFit};
 use crate::units::{Decibels, Radians};
 use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
@@ -98,21 +98,17 @@ impl<'a> RecordParts<'a> {
     }
 
     /// The exponentials that a frequency may have.
-    pub(super) fn directions(&self) -> &'static [RotationSense] {
-        if self.is_complex() {
-            &[RotationSense::Forward, RotationSense::Backward]
-        } else {
-            &[RotationSense::Forward]
-        }
+    pub(super) fn directions(&self) -> &'static [Sense] {
+        if self.is_complex() { &[Sense::Forward, Sense::Backward] } else { &[Sense::Forward] }
     }
 
     /// The sine in a fit of this record, or the exponential.
-    pub(super) fn wave(&self, direction: RotationSense) -> Component {
+    pub(super) fn wave(&self, direction: Sense) -> Component {
         if self.is_complex() { Component::Complex([0, 1], direction) } else { Component::Real(0) }
     }
 
     /// The amplitude at plus or minus the frequency of a tone.
-    pub(super) fn amplitude(&self, fit: &SineFit, tone: usize, direction: RotationSense) -> f64 {
+    pub(super) fn amplitude(&self, fit: &SineFit, tone: usize, direction: Sense) -> f64 {
         match self.wave(direction) {
             Component::Real(part) => fit.channels[part].tones[tone].amplitude.value,
             wave => fit.phasor(wave, tone).amplitude.value,
@@ -159,7 +155,7 @@ impl Quadrature {
 impl Imbalance {
     fn of(fit: &SineFit, tone: usize) -> Self {
         let Ratio { gain, phase } = fit.ratio(Component::Real(1), Component::Real(0), tone);
-        let [tone, image] = [RotationSense::Forward, RotationSense::Backward]
+        let [tone, image] = [Sense::Forward, Sense::Backward]
             .map(|direction| fit.phasor(Component::Complex([0, 1], direction), tone).amplitude.value);
         // The difference of phases beyond minus a quarter of a cycle, in -pi ..= pi.
         let (sine, cosine) = (phase.value.0 + FRAC_PI_2).sin_cos();

@@ -84,14 +84,14 @@ pub struct Ratio {
 
 /// One of the two exponentials of a tone in a complex record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RotationSense {
+pub enum Sense {
     /// At +f.
     Forward,
     /// At -f.
     Backward,
 }
 
-impl RotationSense {
+impl Sense {
     /// The sign of the frequency.
     pub(crate) fn sign(self) -> f64 {
         if self == Self::Forward { 1.0 } else { -1.0 }
@@ -107,7 +107,7 @@ pub enum Component {
     /// The sine in a channel.
     Real(usize),
     /// An exponential in a complex record, whose parts are of one length.
-    Complex(ComplexChannel, RotationSense),
+    Complex(ComplexChannel, Sense),
 }
 
 /// The covariance of all parameters. Channel i has the coefficients theta_i; the frequencies u (radians over

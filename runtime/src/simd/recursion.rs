@@ -62,7 +62,7 @@ impl ColumnTile {
 }
 
 /// One call of the kernel, checked.
-pub(crate) struct Job<'a> {
+pub(crate) struct RecursionJob<'a> {
     recursion: &'a Recursion,
     rows: *mut f64,
     window: *const f64,
@@ -109,7 +109,7 @@ impl RecursionKernel {
         let (rows, window) = (rows.as_mut_ptr(), window.as_ptr());
         // SAFETY: rows 0 to `frames` and the inputs of all frames are in the slices, and the places, columns
         // and coefficients of the form fit them, as asserted.
-        unsafe { (self.run)(&Job { recursion, rows, window, hop, frames }) }
+        unsafe { (self.run)(&RecursionJob { recursion, rows, window, hop, frames }) }
     }
 }
 
@@ -150,11 +150,11 @@ pub(crate) struct Body;
 
 impl Kernel for Body {
     type Sample = f64;
-    type Job<'a> = &'a Job<'a>;
+    type Job<'a> = &'a RecursionJob<'a>;
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<V: Vector<Sample = f64>>(job: &Job<'_>) {
+    unsafe fn run<V: Vector<Sample = f64>>(job: &RecursionJob<'_>) {
         match &job.recursion.form {
             RecursionForm::Sections(vectors) => {
                 let whole = job.frames / STEP * STEP;
@@ -178,7 +178,7 @@ impl Kernel for Body {
 /// next can begin.
 #[inline(always)]
 unsafe fn sections<V: Vector<Sample = f64>, const T: usize>(
-    job: &Job<'_>,
+    job: &RecursionJob<'_>,
     vectors: &[SectionVector],
     t: usize,
 ) {
@@ -227,7 +227,7 @@ unsafe fn section_vector<V: Vector<Sample = f64>, const T: usize>(
 
 /// Frame t, for any A.
 #[inline(always)]
-unsafe fn dense<V: Vector<Sample = f64>>(job: &Job<'_>, tiles: &[ColumnTile], t: usize) {
+unsafe fn dense<V: Vector<Sample = f64>>(job: &RecursionJob<'_>, tiles: &[ColumnTile], t: usize) {
     for tile in tiles {
         match tile.vectors {
             1 => column_tile::<V, 1>(job, tile, t),
@@ -239,7 +239,11 @@ unsafe fn dense<V: Vector<Sample = f64>>(job: &Job<'_>, tiles: &[ColumnTile], t:
 }
 
 #[inline(always)]
-unsafe fn column_tile<V: Vector<Sample = f64>, const R: usize>(job: &Job<'_>, tile: &ColumnTile, t: usize) {
+unsafe fn column_tile<V: Vector<Sample = f64>, const R: usize>(
+    job: &RecursionJob<'_>,
+    tile: &ColumnTile,
+    t: usize,
+) {
     let states = job.recursion.states;
     let mut sums = [V::splat(0.0); R];
     let (x, window) = (job.rows.add(t * states), job.window.add(t * job.hop));

@@ -26,7 +26,7 @@ struct ToneEquation {
 }
 
 /// The equations of a channel at the present values.
-pub(super) struct Equations<'a> {
+pub(super) struct RatioFit<'a> {
     model: &'a ChannelModel,
     /// From 0.
     channel: usize,
@@ -46,7 +46,7 @@ pub(super) struct ChannelSolution {
     pub(super) freedom: usize,
 }
 
-impl LeastSquares for Equations<'_> {
+impl LeastSquares for RatioFit<'_> {
     type Error = CalibrateError;
     /// The equations are linear in all values but the cut-off, which takes three to eight steps.
     const MOST_STEPS: usize = 40;
@@ -101,7 +101,7 @@ impl LeastSquares for Equations<'_> {
     }
 }
 
-impl<'a> Equations<'a> {
+impl<'a> RatioFit<'a> {
     /// Of the tones in a channel whose delay is near `delay` after its nominal one.
     pub(super) fn new(
         model: &'a ChannelModel,

@@ -3,7 +3,7 @@
 use super::phasors::{TonePhasors, ToneRecords};
 use crate::calibrate::warning::CalibrationWarning;
 use crate::linalg::Complex;
-use crate::sine_fit::{RotationSense, SineFit, alias};
+use crate::sine_fit::{Sense, SineFit, alias};
 
 /// Harmonics that are looked at.
 const HARMONICS: std::ops::RangeInclusive<usize> = 2..=10;
@@ -76,7 +76,7 @@ pub(super) fn widen_repeating(
         let parts = captures.parts_of(converter);
         let share = 1.0 / parts.len().pow(2) as f64;
         let first = captures.records_of(converter).start;
-        let amplitude = captures.tone(sines, first, t, RotationSense::Forward).amplitude.value;
+        let amplitude = captures.tone(sines, first, t, Sense::Forward).amplitude.value;
         2.0 * share * repeating[parts].iter().sum::<f64>() / amplitude.powi(2)
     });
 }

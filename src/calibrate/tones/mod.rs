@@ -27,7 +27,7 @@ use super::order::{Distances, other_order};
 use super::record::Acquisition;
 use super::warning::CalibrationWarning;
 use crate::linalg::Complex;
-use crate::sine_fit::{self, ChannelFit as SineChannel, Estimate, RotationSense, alias};
+use crate::sine_fit::{self, ChannelFit as SineChannel, Estimate, Sense, alias};
 use crate::spec::Spec;
 use crate::units::{Decibels, Hertz};
 use ambiguity::{ObservedTone, zone_of};
@@ -127,7 +127,7 @@ impl Tones {
             _ => (located(captures, rate, given)?, (0..given.len()).collect()),
         };
         let sines = sine_fit::fit(&channels, rate, &starts)?;
-        let is_image = |&t: &usize| captures.direction(&sines, t) == RotationSense::Backward;
+        let is_image = |&t: &usize| captures.direction(&sines, t) == Sense::Backward;
         if let Some(t) = (0..sines.tones()).find(is_image) {
             return Err(CalibrateError::OtherSign { tone: sines.frequencies[t].value });
         }
@@ -146,7 +146,7 @@ impl Tones {
         let tone = |&t: &usize| CalibrationTone {
             frequency: sines.frequencies[t],
             zone: (2.0 * (sines.frequencies[t].value / rate).abs()).floor() as usize + 1,
-            amplitude: captures.tone(&sines, first, t, RotationSense::Forward).amplitude,
+            amplitude: captures.tone(&sines, first, t, Sense::Forward).amplitude,
         };
         Ok(Self {
             frames: captures.frames(),
@@ -261,7 +261,7 @@ fn found(
     let (rate, channels, frames) = (model.slow_rate(), captures.channels(), captures.frames());
     let aliases = sine_fit::find_tones(&channels, rate, MOST_TONES, TONE_RANGE)?;
     let sines = sine_fit::fit(&channels, rate, &aliases)?;
-    let directions: Vec<RotationSense> = (0..sines.tones()).map(|t| captures.direction(&sines, t)).collect();
+    let directions: Vec<Sense> = (0..sines.tones()).map(|t| captures.direction(&sines, t)).collect();
     let signed = sines.frequencies.iter().zip(&directions);
     let cycles: Vec<f64> = signed.map(|(f, direction)| direction.sign() * (f.value / rate)).collect();
     let is_own = |&k: &usize| !(0..k).any(|j| is_harmonic(cycles[k], cycles[j], frames));

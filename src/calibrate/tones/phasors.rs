@@ -6,7 +6,7 @@
 use crate::calibrate::model::ChannelModel;
 use crate::calibrate::record::Record;
 use crate::linalg::Complex;
-use crate::sine_fit::{Channel, Component, RotationSense, SineFit, ToneFit};
+use crate::sine_fit::{Channel, Component, Sense, SineFit, ToneFit};
 use crate::spec::FrameLayout;
 use crate::units::Hertz;
 use std::f64::consts::TAU;
@@ -71,7 +71,7 @@ impl<'a> ToneRecords<'a> {
         self.converters[converter].clone()
     }
 
-    fn component(&self, i: usize, direction: RotationSense) -> Component {
+    fn component(&self, i: usize, direction: Sense) -> Component {
         let first = self.parts(i).start;
         match self.is_complex {
             true => Component::Complex([first, first + 1], direction),
@@ -80,7 +80,7 @@ impl<'a> ToneRecords<'a> {
     }
 
     /// Tone `t` of `sines` in record `i`: of complex records the exponential in `direction`.
-    pub(super) fn tone(&self, sines: &SineFit, i: usize, t: usize, direction: RotationSense) -> ToneFit {
+    pub(super) fn tone(&self, sines: &SineFit, i: usize, t: usize, direction: Sense) -> ToneFit {
         sines.phasor(self.component(i, direction), t)
     }
 
@@ -96,7 +96,7 @@ impl<'a> ToneRecords<'a> {
         let frequency = sines.frequencies[t].value;
         let w = TAU * frequency.per_fast_period(model.fast_period).0.abs();
         let of_record = |i: usize| {
-            let tone = self.tone(sines, i, t, RotationSense::Forward);
+            let tone = self.tone(sines, i, t, Sense::Forward);
             let phasor = Complex::from_polar(tone.amplitude.value, tone.phase.value.0);
             if self.is_complex && frequency.0 < 0.0 { phasor.conj() } else { phasor }
         };
@@ -111,7 +111,7 @@ impl<'a> ToneRecords<'a> {
         let ratio = |i: usize| phasor(i) / phasor(reference) / expected(i);
         let sigmas = |converter: usize| {
             let [i, r] = [converter, reference].map(|converter| self.records_of(converter).start);
-            let [own, other] = [i, r].map(|i| self.component(i, RotationSense::Forward));
+            let [own, other] = [i, r].map(|i| self.component(i, Sense::Forward));
             let ratio = sines.ratio(own, other, t);
             let phase = match self.is_complex {
                 true => ratio.phase.sigma.0,
@@ -122,7 +122,7 @@ impl<'a> ToneRecords<'a> {
             // The noise of several records averages, the error of the frequency does not.
             let averaged = |converter: usize| {
                 let records = self.records_of(converter);
-                let amplitude = self.tone(sines, records.start, t, RotationSense::Forward).amplitude;
+                let amplitude = self.tone(sines, records.start, t, Sense::Forward).amplitude;
                 (amplitude.sigma / amplitude.value).powi(2) * (1.0 - 1.0 / records.len() as f64)
             };
             let less = averaged(converter) + averaged(reference);
@@ -138,14 +138,14 @@ impl<'a> ToneRecords<'a> {
     }
 
     /// The exponential that is the tone: the larger one over all records, forward for real samples.
-    pub(super) fn direction(&self, sines: &SineFit, t: usize) -> RotationSense {
+    pub(super) fn direction(&self, sines: &SineFit, t: usize) -> Sense {
         let power = |direction| -> f64 {
             let amplitude = |i| self.tone(sines, i, t, direction).amplitude.value;
             (0..self.records.len()).map(|i| amplitude(i).powi(2)).sum()
         };
-        match self.is_complex && power(RotationSense::Backward) > power(RotationSense::Forward) {
-            true => RotationSense::Backward,
-            false => RotationSense::Forward,
+        match self.is_complex && power(Sense::Backward) > power(Sense::Forward) {
+            true => Sense::Backward,
+            false => Sense::Forward,
         }
     }
 }

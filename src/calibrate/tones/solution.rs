@@ -2,7 +2,7 @@
 
 use super::Tones;
 use super::ambiguity::{modulus, nearest_delay};
-use super::channel::{ChannelSolution, Equations};
+use super::channel::{ChannelSolution, RatioFit};
 use super::phasors::TonePhasors;
 use crate::calibrate::CalibrationSettings;
 use crate::calibrate::error::CalibrateError;
@@ -72,7 +72,7 @@ fn solve_channels(
 ) -> Result<Vec<ChannelSolution>, CalibrateError> {
     let solve = |i| {
         let delay = nearest_delay(tones, i, model.ratio as f64);
-        Equations::new(model, i, fit, tones, delay).solve()
+        RatioFit::new(model, i, fit, tones, delay).solve()
     };
     model.others(reference).map(solve).collect()
 }

@@ -5,22 +5,22 @@ use super::super::isa::Isa;
 use super::super::vector::{Vector, group_lanes};
 use super::phases::Phases;
 use super::single::Single;
-use super::tiling::{Job, Tiling};
+use super::tiling::{FirJob, Tiling};
 use std::marker::PhantomData;
 
 /// Returns false if a sum that is checked is not finite, or the total of those that are.
-pub(super) type FirFn<T> = for<'a> unsafe fn(&'a Job<'a, T>) -> bool;
+pub(super) type FirFn<T> = for<'a> unsafe fn(&'a FirJob<'a, T>) -> bool;
 
 /// P phases with windows cut into steps of D samples.
 struct SteppedFir<T, const D: usize, const P: usize>(PhantomData<T>);
 
 impl<T: SimdElement, const D: usize, const P: usize> Kernel for SteppedFir<T, D, P> {
     type Sample = T;
-    type Job<'a> = &'a Job<'a, T>;
+    type Job<'a> = &'a FirJob<'a, T>;
     type Output = bool;
 
     #[inline(always)]
-    unsafe fn run<V: Vector<Sample = T>>(job: &Job<'_, T>) -> bool {
+    unsafe fn run<V: Vector<Sample = T>>(job: &FirJob<'_, T>) -> bool {
         if const { D > group_lanes::<T>() } {
             unreachable!("a step is at most a group");
         }

@@ -13,11 +13,11 @@
 
 use super::super::dispatch::keep_branch;
 use super::super::vector::Vector;
-use super::tiling::{FrameChunk, Job, sized, tile_size};
+use super::tiling::{FirJob, FrameChunk, sized, tile_size};
 
 /// The work of one group of phases on all frames of a job.
 pub(super) struct Phases<'a, V: Vector, const D: usize, const P: usize> {
-    job: &'a Job<'a, V::Sample>,
+    job: &'a FirJob<'a, V::Sample>,
     chunk: FrameChunk<V::Sample>,
     /// The tile in scratch: its first frame and its vectors, 0 if there is none.
     first: usize,
@@ -52,7 +52,7 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     /// # Safety
     /// As for [`Vector`].
     #[inline(always)]
-    pub(super) unsafe fn new(job: &'a Job<'a, V::Sample>) -> Self {
+    pub(super) unsafe fn new(job: &'a FirJob<'a, V::Sample>) -> Self {
         Self { job, chunk: FrameChunk::NONE, first: 0, waiting: 0, total: V::zero() }
     }
 

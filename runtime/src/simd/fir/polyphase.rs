@@ -5,7 +5,7 @@ use super::super::vector::group_lanes;
 #[cfg(test)]
 use super::super::work;
 use super::kernel::{FirFn, FirKernel};
-use super::tiling::{FrameChunk, Job, SCRATCH, Tiling};
+use super::tiling::{FirJob, FrameChunk, SCRATCH, Tiling};
 use crate::aligned::Aligned;
 
 /// Segments of a call.
@@ -93,7 +93,7 @@ impl<T: SimdElement> Polyphase<T> {
         let mut scratch = std::mem::MaybeUninit::<Scratch<T>>::uninit();
         let mut finite = true;
         for group in &self.groups {
-            let job = Job {
+            let job = FirJob {
                 tiling: &self.tiling,
                 coefficients: group.coefficients.as_ptr(),
                 chunks: &chunks[..segments.len()],
@@ -138,7 +138,7 @@ impl<T: SimdElement> Polyphase<T> {
 /// The job, the chunk and the segment are those of a checked call, whose outputs begin at `room`.
 unsafe fn remainder<T: SimdElement>(
     group: &PhaseGroup<T>,
-    job: &Job<'_, T>,
+    job: &FirJob<'_, T>,
     chunk: &FrameChunk<T>,
     segment: &Segment<'_, T>,
     room: *mut T,
@@ -152,7 +152,7 @@ unsafe fn remainder<T: SimdElement>(
     let x = chunk.x.wrapping_add(chunk.frames * job.tiling.hop);
     let chunks = [FrameChunk { x, out: outputs.as_mut_ptr(), frames: job.tiling.vector }];
     // A vector has at most 16 frames, so the scratch holds them.
-    let finite = (group.kernel)(&Job { chunks: &chunks, first: 0, out_hop: hop, ..*job });
+    let finite = (group.kernel)(&FirJob { chunks: &chunks, first: 0, out_hop: hop, ..*job });
     for (t, phases) in outputs.chunks_exact(hop).enumerate().take(left) {
         let frame = room.add((segment.first + chunk.frames + t) * job.out_hop);
         frame.add(group.first).copy_from_nonoverlapping(phases.as_ptr(), group.width);

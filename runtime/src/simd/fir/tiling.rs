@@ -118,7 +118,7 @@ impl<T> FrameChunk<T> {
 
 /// One call of a kernel, checked.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Job<'a, T> {
+pub(super) struct FirJob<'a, T> {
     pub(super) tiling: &'a Tiling,
     pub(super) coefficients: *const T,
     pub(super) chunks: &'a [FrameChunk<T>],
