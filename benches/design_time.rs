@@ -7,7 +7,7 @@ mod specs;
 mod stopwatch;
 
 use hybank::bank::Bank;
-use hybank::design::{Design, DesignError, Options, analyze, prove};
+use hybank::design::{Design, DesignError, DesignOptions, analyze, prove};
 use hybank::spec::{DesignSpec, Method, Spec, WordLengths};
 use hybank::verify::verify;
 use specs::{alike, butterworth, thesis, with_taps};
@@ -17,7 +17,7 @@ use stopwatch::time;
 
 /// Designs without a search for proofs, which is timed apart.
 fn design(spec: &Spec) -> Result<Design, DesignError> {
-    hybank::design::design(spec, &Options::without_proof())
+    hybank::design::design(spec, &DesignOptions::without_proof())
 }
 
 fn by(method: Method, taps: Option<usize>, spec: Spec) -> Spec {

@@ -5,7 +5,7 @@
 //! the widest one. Each fast sample takes N K multiply-adds, K = taps / M. Every row is the best of many
 //! repeats, and so is the peak, which is measured again beside each row.
 
-use hybank::bank::{Bank, StateSpace, SynthesisFilters};
+use hybank::bank::{Bank, StateMatrices, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
 use hybank::runtime::{
     Algorithm, Interleaved, Isa, Options, PcmOutput, Precision, Stream, ThreadPool, multiply_add_chains,
@@ -40,7 +40,7 @@ fn recursion() -> Bank {
     let matrix = |rows: usize, cols: usize| (0..rows).map(|i| vec![0.1 / (1 + i) as f64; cols]).collect();
     let a = (0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect();
     Bank::bare(
-        SynthesisFilters::StateSpace(StateSpace { a, b: matrix(n, 4), c: matrix(4, n), d: matrix(4, 4) }),
+        SynthesisFilters::StateSpace(StateMatrices { a, b: matrix(n, 4), c: matrix(4, n), d: matrix(4, 4) }),
         4,
     )
 }

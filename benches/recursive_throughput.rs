@@ -6,7 +6,7 @@
 //! biquad of the usual kind takes 5. So three rates stand side by side: sections, multiply-adds by five
 //! ("biquads"), and the share of the peak.
 
-use hybank::bank::{Bank, StateSpace, SynthesisFilters};
+use hybank::bank::{Bank, StateMatrices, SynthesisFilters};
 use hybank::runtime::{Isa, Options, Stream, multiply_add_chains};
 use std::hint::black_box;
 use std::time::Instant;
@@ -17,7 +17,7 @@ const REPEATS: usize = 60;
 /// A bank and what it costs.
 struct Case {
     name: String,
-    filter: StateSpace,
+    filter: StateMatrices,
     sections: usize,
     /// Multiply-adds per frame that the matrices ask for, zeros and delay lines left out.
     work: usize,
@@ -47,7 +47,7 @@ fn parallel(sections: usize, n: usize, m: usize) -> Case {
     let (b, c, d) = (matrix(states, n, entry), matrix(m, states, entry), matrix(m, n, entry));
     Case {
         name: format!("{sections} sections, N = {n}, M = {m}"),
-        filter: StateSpace { a: matrix(states, states, rotation), b, c, d },
+        filter: StateMatrices { a: matrix(states, states, rotation), b, c, d },
         sections,
         work: sections * (4 + 2 * n + 2 * m) + n * m,
     }
@@ -61,7 +61,7 @@ fn apart(n: usize, each: usize) -> Case {
     let c = matrix(n, states, |i, j| own(entry(i, j), j / (2 * each) == i));
     Case {
         name: format!("{n} channels x {each} sections apart"),
-        filter: StateSpace {
+        filter: StateMatrices {
             a: matrix(states, states, rotation),
             b,
             c,
@@ -77,7 +77,7 @@ fn full(states: usize, n: usize, m: usize) -> Case {
     let a = matrix(states, states, |i, j| 0.9 / states as f64 * ((i * 7 + j * 3) as f64).cos());
     Case {
         name: format!("{states} states, full matrix, N = {n}, M = {m}"),
-        filter: StateSpace {
+        filter: StateMatrices {
             a,
             b: matrix(states, n, entry),
             c: matrix(m, states, entry),
@@ -100,13 +100,13 @@ fn designed(sections: usize, line: usize, n: usize, m: usize) -> Case {
     let b = matrix(order, n, |i, j| f64::from(u8::from(i == order - n + j)));
     Case {
         name: format!("{sections} sections after {line} frames, N = {n}, M = {m}"),
-        filter: StateSpace { a, b, c: matrix(m, order, entry), d: matrix(m, n, entry) },
+        filter: StateMatrices { a, b, c: matrix(m, order, entry), d: matrix(m, n, entry) },
         sections,
         work: sections * (4 + 2 * n + 2 * m) + (line + 1) * n * m,
     }
 }
 
-fn bank(filter: StateSpace) -> Bank {
+fn bank(filter: StateMatrices) -> Bank {
     let ratio = filter.d.len();
     Bank::bare(SynthesisFilters::StateSpace(filter), ratio)
 }

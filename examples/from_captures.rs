@@ -45,7 +45,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let records: Vec<Record> =
         captured(&built, "tones:3.1kHz,5.3kHz")?.into_iter().map(Record::new).collect();
-    let settings = calibrate::Settings { reference: 1, ..calibrate::Settings::default() };
+    let settings =
+        calibrate::CalibrationSettings { reference: 1, ..calibrate::CalibrationSettings::default() };
     let found = calibrate(&drawn, &records, &CalibrationSignal::Tones(TONES.to_vec()), settings)?;
     let (measured, _) = applied(&drawn, &found);
     println!("delay of channel 1: {}", measured.channels[0].delay);

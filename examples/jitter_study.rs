@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release --example jitter_study`
 
-use hybank::design::{Options, analyze, design};
+use hybank::design::{DesignOptions, analyze, design};
 use hybank::spec::Spec;
 use hybank::units::Seconds;
 use std::error::Error;
@@ -27,7 +27,7 @@ taps = 22
 const ERRORS: [f64; 7] = [-0.1, -0.05, -0.02, 0.0, 0.02, 0.05, 0.1];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let bank = design(&Spec::from_toml(SPEC, "spec")?, &Options::default())?.bank;
+    let bank = design(&Spec::from_toml(SPEC, "spec")?, &DesignOptions::default())?.bank;
     println!("gamma; rows: error of delay 1, columns: error of delay 2 (fast periods)\n");
     print!("{:>7}", "");
     ERRORS.iter().for_each(|second| print!("{second:>9.2}"));

@@ -8,13 +8,13 @@ use super::capture_file::{start, unread};
 use super::file_kind::FileKind;
 use super::print::{Failure, check_json, failed, failed_at, is_dash, say_understood, show, warn};
 use super::written::{Mono, begin_file, begin_recording, check_outputs, write_text, write_together};
-use hybank::align::{AlignError, AlignSettings, AlignedChannel, Alignment, Step, align};
+use hybank::align::{AlignError, AlignSettings, AlignedChannel, Alignment, ClockStep, align};
 use hybank::calibrate::{CalibrateError, Record};
 use hybank::captures::{Captures, Converters};
 use hybank::figures::Alone;
 use hybank::io::{Container, PcmFormat, ReadOptions};
 use hybank::pipeline::matching::{check_rate, common_rate};
-use hybank::quantity::{self, Time};
+use hybank::quantity::{self, WrittenTime};
 use hybank::sine_fit::Estimate;
 use hybank::spec::{DesignOverrides, Spec};
 use hybank::units::Seconds;
@@ -57,7 +57,7 @@ pub(super) struct Args {
     trim: Option<PathBuf>,
     /// How far apart the recordings began at most, as 50ms or 2s
     #[arg(long, value_name = "TIME", value_parser = quantity::time)]
-    within: Option<Time>,
+    within: Option<WrittenTime>,
     /// The channel whose clock is the time, from 1 [default: that of the spec's uncertainty table, or 1]
     #[arg(long, value_name = "I")]
     reference: Option<usize>,
@@ -105,7 +105,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         Failure::Input(format!("the values found make no spec: {problem}; nothing was written"))
     })?;
     args.write(&written, &found, &recordings, &others)?;
-    Report::new(&spec, &found, alone, warnings).print(&args.output, &others, args.json)
+    AlignReport::new(&spec, &found, alone, warnings).print(&args.output, &others, args.json)
 }
 
 impl Args {
@@ -211,7 +211,7 @@ impl Recordings {
 
 /// The report of an alignment.
 #[derive(Debug, serde::Serialize)]
-struct Report {
+struct AlignReport {
     /// The reference channel, from 1.
     reference: usize,
     /// Frames that all recordings have.
@@ -219,7 +219,7 @@ struct Report {
     /// Pieces that were compared, and those of them that gave delays.
     pieces: usize,
     measured: usize,
-    channels: Vec<ChannelReport>,
+    channels: Vec<ChannelAlignment>,
     /// What one recorder gives, and all of them together.
     alone: Alone,
     one_suffices: bool,
@@ -227,7 +227,7 @@ struct Report {
 }
 
 #[derive(Debug, serde::Serialize)]
-struct ChannelReport {
+struct ChannelAlignment {
     /// From 1.
     channel: usize,
     /// Samples to cut off at the beginning.
@@ -238,11 +238,11 @@ struct ChannelReport {
     gain: Interval,
     offset: Interval,
     /// Where samples were lost or came in.
-    steps: Vec<Step>,
+    steps: Vec<ClockStep>,
 }
 
-impl ChannelReport {
-    fn new(spec: &Spec, channel: usize, found: &AlignedChannel, steps: &[Step]) -> Self {
+impl ChannelAlignment {
+    fn new(spec: &Spec, channel: usize, found: &AlignedChannel, steps: &[ClockStep]) -> Self {
         let h = spec.fast_period;
         let Estimate { value, sigma } = found.delay;
         let delay = Estimate { value: value.in_fast_periods(h), sigma: sigma.in_fast_periods(h) };
@@ -259,7 +259,7 @@ impl ChannelReport {
     }
 }
 
-impl Report {
+impl AlignReport {
     fn new(spec: &Spec, found: &Alignment, alone: Alone, mut warnings: Vec<String>) -> Self {
         let channels = found.channels.iter().enumerate();
         warnings.extend(found.warnings.iter().map(ToString::to_string));
@@ -269,7 +269,7 @@ impl Report {
             pieces: found.pieces,
             measured: found.measured,
             channels: channels
-                .map(|(i, one)| ChannelReport::new(spec, i + 1, one, found.instants(i).steps()))
+                .map(|(i, one)| ChannelAlignment::new(spec, i + 1, one, found.instants(i).steps()))
                 .collect(),
             alone,
             one_suffices: alone.suffices(),
@@ -290,7 +290,7 @@ impl Report {
              channel    cut off     delay (fast periods)      drift (ppm)               gain                      offset\n"
         );
         for channel in &self.channels {
-            let ChannelReport { channel, skip, delay_samples, drift_ppm, gain, offset, .. } = channel;
+            let ChannelAlignment { channel, skip, delay_samples, drift_ppm, gain, offset, .. } = channel;
             let [delay, drift, gain, offset] =
                 [delay_samples, drift_ppm, gain, offset].map(|cell| shown(*cell));
             let _ = writeln!(text, "  {channel:<10} {skip:<11} {delay:<25} {drift:<25} {gain:<25} {offset}");

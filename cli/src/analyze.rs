@@ -9,7 +9,7 @@ use hybank::design::uncertainty::{BoxRule, BoxStudy, BoxWidths, ReferenceChannel
 use hybank::design::{self, Analysis, DesignError, GammaScale, MeanAnalysis};
 use hybank::figures::{Figures, KeyFigures};
 use hybank::overview::{decibels, frequency, key_figures, six_digits, understood};
-use hybank::quantity::{self, Time, readable};
+use hybank::quantity::{self, WrittenTime, readable};
 use hybank::spec::{ErrorBox, ErrorPoint};
 use hybank::units::Seconds;
 use hybank::verify::Verified;
@@ -40,7 +40,7 @@ pub(super) struct Args {
     bank: PathBuf,
     /// True delay minus the delay in the bank, one value per channel: 10ps, 1e-11 or "0.01 samples"
     #[arg(long, value_name = "TIMES", value_delimiter = ',', value_parser = quantity::time)]
-    delay_error: Vec<Time>,
+    delay_error: Vec<WrittenTime>,
     /// Also prove an upper bound of gamma (bounded-real lemma, with every rounding error bounded)
     #[arg(long)]
     certify: bool,
@@ -57,7 +57,7 @@ struct BoxArgs {
     /// Bound the worst case over delays that are off by up to this much (10ps, 0.01samples, or seconds): one
     /// value for all channels but the reference, or one per channel
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::time)]
-    delay_box: Vec<Time>,
+    delay_box: Vec<WrittenTime>,
     /// Also gains that are off by up to this share (1%, 500ppm, 0.01); values as for --delay-box
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
     gain_box: Vec<f64>,
@@ -90,7 +90,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let analysis = design::analyze(&bank, &delay_errors).in_file(&args.bank)?;
     let certified = args.certify.then(|| design::certify(&bank)).transpose().in_file(&args.bank)?;
     let worst_case = errors.map(|errors| BoxStudy::new(&bank, &errors)).transpose().in_file(&args.bank)?;
-    let report = Report {
+    let report = AnalysisReport {
         understood: bank.spec.as_ref().map(understood).unwrap_or_default(),
         is_normalised: bank.is_normalised(),
         scale: GammaScale::new(&bank, &delay_errors).in_file(&args.bank)?,
@@ -100,7 +100,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         with_errors: with_errors(&bank, &delay_errors).in_file(&args.bank)?,
         worst_case,
     };
-    show(&report, args.json, Report::text)
+    show(&report, args.json, AnalysisReport::text)
 }
 
 /// The figures with other delays; none without errors.
@@ -126,7 +126,7 @@ impl Args {
 }
 
 #[derive(Debug, serde::Serialize)]
-struct Report {
+struct AnalysisReport {
     /// The spec in units of the user.
     understood: String,
     #[serde(skip)]
@@ -145,7 +145,7 @@ struct Report {
     worst_case: Option<BoxStudy>,
 }
 
-impl Report {
+impl AnalysisReport {
     fn text(&self) -> String {
         let Analysis { gamma, peak_hertz, noncausal, mean } = self.analysis;
         let proof = self.certified.map_or_else(String::new, |proof| {

@@ -1,6 +1,6 @@
 //! `fuse --measure`: the figures of the recording before and after.
 
-use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, check_files_on_disk, unread};
+use super::capture_file::{CaptureFile, MOST_MEASURED, ReadingRules, check_files_on_disk, unread};
 use super::measure::{ToneArg, tone, tones};
 use super::plot::{check_picture, write_picture};
 use super::print::{Failure, failed, is_dash};
@@ -72,7 +72,7 @@ impl BeforeAfterArgs {
         output: &Path,
         force: bool,
     ) -> Result<BeforeAfter, Failure> {
-        let fused = CaptureFile::read(output, Reading::channel(None, MOST_MEASURED))?;
+        let fused = CaptureFile::read(output, ReadingRules::channel(None, MOST_MEASURED))?;
         check_real(&reader).map_err(failed)?;
         let captures = Captures::read(&mut reader, MOST_MEASURED).map_err(unread)?;
         let channels: Vec<_> = captures.channels.into_iter().map(|channel| channel.samples).collect();

@@ -4,14 +4,14 @@ use super::before_after;
 use super::observer::RunObserver;
 use super::output::begin_samples;
 use super::print::{Failure, check_strict, failed, name, print, print_report, stopped, warn};
-use super::run::{Job, each_block};
+use super::run::{BankRun, each_block};
 use hybank::files::commit_all;
 use hybank::interchange::{BitTrue, WordSizes};
 use hybank::io::{Container, MultiReader, OutputHeader, PcmFormat, RecordedFrames, SampleWriter};
 use hybank::messages::Quoted;
 use hybank::overview::BeforeAfter;
 use hybank::pipeline::DroppedLatency;
-use hybank::runtime::{Input, Isa, SideBySide};
+use hybank::runtime::{FrameSource, Isa, SideBySide};
 
 /// The options.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -28,7 +28,7 @@ pub(super) struct BitTrueArgs {
 
 /// How the words were used.
 #[derive(Debug, serde::Serialize)]
-struct Report {
+struct BitTrueReport {
     samples: u64,
     rate: u64,
     frames: u64,
@@ -54,7 +54,7 @@ impl BitTrueArgs {
     /// Fuses all that `reader` gives.
     pub(super) fn fuse(
         self,
-        job: &Job<'_>,
+        job: &BankRun<'_>,
         reader: &mut MultiReader,
         observer: &mut RunObserver,
         measured: impl FnOnce() -> Result<Option<BeforeAfter>, Failure>,
@@ -69,11 +69,11 @@ impl BitTrueArgs {
         let output = begin_samples(job.output, header, job.args.force).map_err(stopped)?;
         let skip = if job.dropped == DroppedLatency::All { job.bank.output_delay() } else { 0 };
         let mut run =
-            Run { model, output, format, bits, skip, owed: skip, ratio: job.bank.ratio, samples: 0 };
+            ModelRun { model, output, format, bits, skip, owed: skip, ratio: job.bank.ratio, samples: 0 };
         each_block(reader, observer, |_, recordings| run.process(recordings))?;
         let frames = reader.consumed();
         run.flush()?;
-        let mut report = Report {
+        let mut report = BitTrueReport {
             samples: run.samples,
             rate: rate.round() as u64,
             frames,
@@ -140,7 +140,7 @@ fn converter_bits(reader: &MultiReader) -> Option<u32> {
 }
 
 /// A model that runs.
-struct Run {
+struct ModelRun {
     model: BitTrue,
     output: SampleWriter,
     format: PcmFormat,
@@ -154,7 +154,7 @@ struct Run {
     samples: u64,
 }
 
-impl Run {
+impl ModelRun {
     /// Frames without a signal, until M samples have come out for each frame of the captures.
     fn flush(&mut self) -> Result<(), Failure> {
         let (frames, resting) = (self.owed.div_ceil(self.ratio), self.model.resting());

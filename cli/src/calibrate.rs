@@ -1,16 +1,16 @@
 //! `hybank calibrate`: delays, gains, offsets and cut-offs of the channels from captures.
 
 use super::bank_file::{bad_flag, parse_spec, read_kind};
-use super::calibrate_report::Report;
+use super::calibrate_report::CalibrationReport;
 use super::capture_args::{CaptureArgs, InterleavedArgs, check_stdin};
-use super::capture_file::{CaptureFile, MOST_MEASURED, Reading, start, unread};
+use super::capture_file::{CaptureFile, MOST_MEASURED, ReadingRules, start, unread};
 use super::file_kind::FileKind;
 use super::measure::{ToneArg, tone, tones};
 use super::print::{Failure, check_json, explained, failed, say_understood, warn};
 use super::written::{check_output, write_text};
 use hybank::calibrate::{
-    Acquisition, CalibrateError, Calibration, CalibrationSignal, Fit, Fitting, Record, Settings, Warning,
-    applied, calibrate_pooled, usual_reference,
+    Acquisition, CalibrateError, Calibration, CalibrationSettings, CalibrationSignal, CalibrationWarning,
+    FittedValues, Fitting, Record, applied, calibrate_pooled, usual_reference,
 };
 use hybank::captures::{Captures, Converters};
 use hybank::messages::Quoted;
@@ -137,14 +137,18 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 
 impl Args {
     /// The calibrated spec and the report. `warnings` are those of the captures.
-    fn calibrated(&self, spec: &Spec, warnings: &mut Vec<String>) -> Result<(Spec, Report), Failure> {
+    fn calibrated(
+        &self,
+        spec: &Spec,
+        warnings: &mut Vec<String>,
+    ) -> Result<(Spec, CalibrationReport), Failure> {
         let (settings, signal) = (self.settings(spec)?, self.signal(spec)?);
         let captures = self.read(&self.captures, spec, warnings)?;
         let found = calibrate_pooled(spec, &borrowed(&captures), &signal, settings);
         let found = found.map_err(|error| of_captures(&captures, error))?;
         self.check_misfit(&found, warnings)?;
         let (calibrated, more) = applied(spec, &found);
-        let mut report = Report::new(spec, &found);
+        let mut report = CalibrationReport::new(spec, &found);
         report.add(&more);
         if !self.check.is_empty() {
             let captures = self.read(&self.check, spec, warnings)?;
@@ -166,8 +170,9 @@ impl Args {
         let Some(misfit) = found.misfit.filter(|&misfit| misfit > MOST_MISFIT && !self.force) else {
             return Ok(());
         };
-        let reasons =
-            |warning: &&Warning| matches!(warning, Warning::Outlying { .. } | Warning::CutoffExplains { .. });
+        let reasons = |warning: &&CalibrationWarning| {
+            matches!(warning, CalibrationWarning::Outlying { .. } | CalibrationWarning::CutoffExplains { .. })
+        };
         warnings.extend(found.warnings.iter().filter(reasons).map(explained));
         Err(Failure::Input(format!(
             "the captures contradict the spec: they differ from its model {misfit:.0} times as much as their noise \
@@ -241,14 +246,14 @@ impl Args {
         Ok(Acquired { records: captures.records(self.clip), name: captures.name })
     }
 
-    fn settings(&self, spec: &Spec) -> Result<Settings, Failure> {
+    fn settings(&self, spec: &Spec) -> Result<CalibrationSettings, Failure> {
         Spec { fit: self.fit.clone(), ..spec.clone() }
             .check()
             .map_err(|error| bad_flag("fit", error.problem()))?;
         let given = if self.fit.is_empty() { &spec.fit } else { &self.fit };
-        let fit = if given.is_empty() { Fit::default() } else { given.iter().copied().collect() };
+        let fit = if given.is_empty() { FittedValues::default() } else { given.iter().copied().collect() };
         let reference = reference(self.reference, spec)?;
-        Ok(Settings { fit, reference })
+        Ok(CalibrationSettings { fit, reference })
     }
 
     fn signal(&self, spec: &Spec) -> Result<CalibrationSignal, Failure> {
@@ -256,7 +261,7 @@ impl Args {
             return Ok(CalibrationSignal::Any);
         }
         if let Some(path) = &self.training {
-            let reading = Reading::channel(None, MOST_MEASURED);
+            let reading = ReadingRules::channel(None, MOST_MEASURED);
             let training = CaptureFile::read(path, reading)?;
             let (rate, samples) = (training.rate, training.finite(path)?);
             // In normalised time the recording's own rate is the fast rate.

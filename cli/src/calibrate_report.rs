@@ -1,7 +1,7 @@
 //! What `calibrate` prints.
 
 use super::print::{Failure, explained, is_dash, show, warn};
-use hybank::calibrate::{Calibration, ChannelEstimate, Warning};
+use hybank::calibrate::{Calibration, CalibrationWarning, ChannelEstimate};
 use hybank::messages::Quoted;
 use hybank::sine_fit::Estimate;
 use hybank::spec::{HALF_WIDTH, Spec};
@@ -21,7 +21,7 @@ pub(super) struct Interval {
 }
 
 #[derive(Debug, serde::Serialize)]
-struct ChannelReport {
+struct CalibratedChannel {
     /// From 1.
     channel: usize,
     /// Fast periods; absent where the value of the spec stands.
@@ -71,11 +71,11 @@ struct CheckedChannel {
 
 /// The report of a calibration.
 #[derive(Debug, serde::Serialize)]
-pub(super) struct Report {
+pub(super) struct CalibrationReport {
     /// The reference channel, from 1.
     reference: usize,
     frames: usize,
-    channels: Vec<ChannelReport>,
+    channels: Vec<CalibratedChannel>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     tones: Vec<ToneReport>,
     /// Delays are known modulo this many fast periods.
@@ -98,7 +98,7 @@ pub(super) fn periods(estimate: Estimate<FastPeriods>) -> Interval {
     interval(Estimate { value: estimate.value.0, sigma: estimate.sigma.0 })
 }
 
-impl Report {
+impl CalibrationReport {
     pub(super) fn new(spec: &Spec, found: &Calibration) -> Self {
         let h = spec.fast_period;
         let channel = |(i, (estimate, clipped)): (usize, (&ChannelEstimate, &usize))| {
@@ -106,7 +106,7 @@ impl Report {
                 value: estimate.value.in_seconds(h).0,
                 half_width: HALF_WIDTH * estimate.sigma.in_seconds(h).0,
             };
-            ChannelReport {
+            CalibratedChannel {
                 channel: i + 1,
                 delay_samples: estimate.delay.map(periods),
                 delay: estimate.delay.map(in_seconds),
@@ -137,7 +137,7 @@ impl Report {
     }
 
     /// Sorts warnings and notes.
-    pub(super) fn add(&mut self, warnings: &[Warning]) {
+    pub(super) fn add(&mut self, warnings: &[CalibrationWarning]) {
         for warning in warnings {
             let list = if warning.is_note() { &mut self.notes } else { &mut self.warnings };
             list.push(explained(warning));

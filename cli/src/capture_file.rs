@@ -20,7 +20,7 @@ pub(super) struct CaptureFile {
 
 /// How a recording is read.
 #[derive(Debug, Clone)]
-pub(super) struct Reading {
+pub(super) struct ReadingRules {
     /// Format and channel; a mono recording needs no channel.
     pub(super) options: ReadOptions<'static>,
     /// The rate, if the file states none.
@@ -30,7 +30,7 @@ pub(super) struct Reading {
     pub(super) takes_complex: bool,
 }
 
-impl Reading {
+impl ReadingRules {
     /// Channel `channel` (from 1) of a file with a header and a full scale of its own.
     pub(super) fn channel(channel: Option<usize>, most: usize) -> Self {
         let only = channel.map(|channel| channel.saturating_sub(1));
@@ -41,7 +41,7 @@ impl Reading {
 
 impl CaptureFile {
     /// Reads a recording; `-` is standard input.
-    pub(super) fn read(path: &Path, reading: Reading) -> Result<Self, Failure> {
+    pub(super) fn read(path: &Path, reading: ReadingRules) -> Result<Self, Failure> {
         let mut reader = start(&[path.to_owned()], reading.options)?;
         Captures::check_mono(&reader).map_err(unread)?;
         if !reading.takes_complex {

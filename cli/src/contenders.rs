@@ -13,14 +13,14 @@ use hybank::units::{Decibels, FastPeriods};
 pub(super) const SETTLING: usize = 2000;
 
 /// The captures of the two parts of the signal. Everything here is linear, so each part has its own error.
-pub(super) struct Parts {
+pub(super) struct PartCaptures {
     /// Within the band of the spec.
     pub(super) in_band: Captured,
     /// Most of it within the band, and a little at all frequencies.
     pub(super) step: Captured,
 }
 
-impl Parts {
+impl PartCaptures {
     /// Both together.
     pub(super) fn sum(&self) -> Captured {
         let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + b).collect();
@@ -66,8 +66,8 @@ pub(super) struct Contender {
     pub(super) file: String,
     pub(super) gamma: Option<f64>,
     /// For the chirp and the tones.
-    pub(super) in_band: Error,
-    pub(super) step: Error,
+    pub(super) in_band: ContenderError,
+    pub(super) step: ContenderError,
     /// Of the whole signal.
     #[serde(skip)]
     pub(super) samples: Vec<f64>,
@@ -75,7 +75,7 @@ pub(super) struct Contender {
 
 /// The error against the exact fast samples.
 #[derive(Debug, serde::Serialize)]
-pub(super) struct Error {
+pub(super) struct ContenderError {
     pub(super) rmse: f64,
     pub(super) max_error: f64,
     /// 20 log10(rms of the target / rmse).
@@ -83,7 +83,11 @@ pub(super) struct Error {
 }
 
 /// The banks in the order of [`BANKS`], the spline, and plain interleaving last.
-pub(super) fn contend(spec: &Spec, problem: &Problem, parts: &Parts) -> Result<Vec<Contender>, Failure> {
+pub(super) fn contend(
+    spec: &Spec,
+    problem: &Problem,
+    parts: &PartCaptures,
+) -> Result<Vec<Contender>, Failure> {
     let mut contenders = Vec::new();
     for BankOf { name, file, method, knows_the_band } in BANKS {
         let bank = designed(spec, method, knows_the_band)?;
@@ -110,14 +114,14 @@ fn designed(spec: &Spec, method: Method, knows_the_band: bool) -> Result<Bank, F
     let mut variant = spec.clone();
     variant.design = DesignSpec::new(method, spec.design.taps.filter(|_| method.has_taps()));
     variant.signal = variant.signal.filter(|_| knows_the_band);
-    Ok(design::design(&variant, &design::Options::without_proof()).map_err(failed)?.bank)
+    Ok(design::design(&variant, &design::DesignOptions::without_proof()).map_err(failed)?.bank)
 }
 
 impl Contender {
     fn judge(
         name: &'static str,
         file: &str,
-        parts: &Parts,
+        parts: &PartCaptures,
         fuse: impl Fn(&[Vec<f64>]) -> Result<Vec<f64>, Failure>,
     ) -> Result<Self, Failure> {
         let (in_band, step) = (fuse(&parts.in_band.channels)?, fuse(&parts.step.channels)?);
@@ -125,14 +129,14 @@ impl Contender {
             name,
             file: format!("fused-{file}.wav"),
             gamma: None,
-            in_band: Error::of(&in_band, &parts.in_band.target),
-            step: Error::of(&step, &parts.step.target),
+            in_band: ContenderError::of(&in_band, &parts.in_band.target),
+            step: ContenderError::of(&step, &parts.step.target),
             samples: in_band.iter().zip(&step).map(|(a, b)| a + b).collect(),
         })
     }
 }
 
-impl Error {
+impl ContenderError {
     fn of(samples: &[f64], target: &[f64]) -> Self {
         let errors = samples.iter().zip(target).skip(SETTLING).map(|(sample, target)| sample - target);
         let error_power: f64 = errors.clone().map(|error| error * error).sum();

@@ -1,6 +1,6 @@
 //! `hybank demo`: designs, captures and fuses one example, and compares the error with other methods.
 
-use super::contenders::{Contender, Parts, SETTLING, contend};
+use super::contenders::{Contender, PartCaptures, SETTLING, contend};
 use super::print::{Failure, failed, failed_at, show};
 use super::written::{Mono, create_folder, write_recordings, write_text};
 use hybank::design::{self, Problem};
@@ -47,7 +47,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let frames = (DURATION / (spec.fast_period * spec.ratio as f64)) as usize;
     let captured =
         |source: Source| capture(&problem, &Analog::Known(source.normalised(spec.fast_period)), frames);
-    let parts = Parts { in_band: captured(in_band()), step: captured(step()) };
+    let parts = PartCaptures { in_band: captured(in_band()), step: captured(step()) };
     let contenders = contend(&spec, &problem, &parts)?;
     let pictures =
         Pictures { spec: &spec, captured: &parts.sum(), step: &parts.step.target, contenders: &contenders };

@@ -1,7 +1,7 @@
 //! `hybank design`: from a spec file to a bank file.
 
 use super::bank_file::{bad_flag, load_spec};
-use super::design_report::{Judged, Report};
+use super::design_report::{DesignReport, JudgedBank};
 use super::design_studies::BandHint;
 use super::interrupt::interrupts;
 use super::print::{
@@ -11,7 +11,7 @@ use super::print::{
 use super::written::{check_output, write_text};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
-use hybank::design::{self, Design, DesignError, Options, Stage, Stop, TIME_LIMIT};
+use hybank::design::{self, Design, DesignError, DesignOptions, Stage, Stop, TIME_LIMIT};
 use hybank::messages::Quoted;
 use hybank::spec::{DesignOverrides, Method, Spec, WordLengths};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -154,7 +154,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let begin = Instant::now();
     let found = designed(args, &spec)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
-    let mut judged = Judged::new(&found.bank).in_file(&args.spec)?;
+    let mut judged = JudgedBank::new(&found.bank).in_file(&args.spec)?;
     if !args.force {
         judged.check_useful(&found.bank).in_file(&args.spec)?;
     }
@@ -166,7 +166,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     if !is_ended {
         judged.hint = BandHint::new(&found, seconds).in_file(&args.spec)?;
     }
-    let report = Report::new(args.output.display().to_string(), &found, judged, seconds);
+    let report = DesignReport::new(args.output.display().to_string(), &found, judged, seconds);
     if is_dash(&args.output) {
         say(&report.text(args.verbose));
         return Ok(());
@@ -177,7 +177,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 /// The design of a spec. Its time limit and the first interrupt end it with what it has.
 fn designed(args: &Args, spec: &Spec) -> Result<Design, Failure> {
     let time_limit = (!args.no_limit).then_some(TIME_LIMIT);
-    let watch = Watch {
+    let watch = DesignWatch {
         stop: Stop::default(),
         interrupts: interrupts(),
         limit: time_limit.map(|limit| limit + PATIENCE),
@@ -186,7 +186,7 @@ fn designed(args: &Args, spec: &Spec) -> Result<Design, Failure> {
     };
     let observer = |stage| watch.note(stage);
     let stop = watch.stop.clone();
-    let options = Options { time_limit, observer: &observer, stop, ..Options::default() };
+    let options = DesignOptions { time_limit, observer: &observer, stop, ..DesignOptions::default() };
     watch.during(|| design::design(spec, &options)).in_file(&args.spec)
 }
 
@@ -217,7 +217,7 @@ const LOOK: Duration = Duration::from_millis(125);
 const LINE: Duration = Duration::from_secs(30);
 
 /// Follows a design: shows what it does, ends it at an interrupt, and gives it up long after its limit.
-struct Watch<'a> {
+struct DesignWatch<'a> {
     stop: Stop,
     interrupts: Receiver<()>,
     limit: Option<Duration>,
@@ -226,7 +226,7 @@ struct Watch<'a> {
     stage: Mutex<Option<Stage>>,
 }
 
-impl Watch<'_> {
+impl DesignWatch<'_> {
     /// The step that begins.
     fn note(&self, stage: Stage) {
         *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = Some(stage);
@@ -286,8 +286,8 @@ impl Watch<'_> {
 mod tests {
     use super::*;
 
-    fn watch<'a>(limit: Option<Duration>, give_up: &'a (dyn Fn() + Sync)) -> Watch<'a> {
-        Watch {
+    fn watch<'a>(limit: Option<Duration>, give_up: &'a (dyn Fn() + Sync)) -> DesignWatch<'a> {
+        DesignWatch {
             stop: Stop::default(),
             interrupts: crossbeam_channel::never(),
             limit,
@@ -322,7 +322,7 @@ mod tests {
     #[test]
     fn an_interrupt_stops_the_design() {
         let (interrupt, interrupts) = bounded(1);
-        let watch = Watch { interrupts, ..watch(None, &|| ()) };
+        let watch = DesignWatch { interrupts, ..watch(None, &|| ()) };
         let begin = Instant::now();
         watch.during(|| {
             interrupt.send(()).unwrap();

@@ -1,9 +1,9 @@
 //! The report of `hybank design` and `hybank import` on a finished bank, as text and as JSON.
 
-use super::design_studies::{BandHint, Words, known, number, order_text, robust_text};
+use super::design_studies::{BandHint, WordReport, known, number, order_text, robust_text};
 use hybank::bank::{Bank, Gamma, SynthesisFilters};
 use hybank::design::{
-    Design, DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, analyze_mean,
+    Design, DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, Study, analyze_mean,
 };
 use hybank::figures::Figures;
 use hybank::messages::{Quoted, counted};
@@ -16,7 +16,7 @@ use hybank::verify::Verified;
 
 /// The report; serialised it is that of `--json`.
 #[derive(Debug, serde::Serialize)]
-pub(super) struct Report<'a> {
+pub(super) struct DesignReport<'a> {
     bank: String,
     /// The spec in units of the user.
     understood: String,
@@ -33,17 +33,16 @@ pub(super) struct Report<'a> {
     gamma: &'a Gamma,
     /// For integer taps.
     #[serde(skip_serializing_if = "Option::is_none")]
-    words: Option<Words<'a>>,
+    words: Option<WordReport<'a>>,
     /// For a spec with `[uncertainty]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     robust: Option<&'a RobustStudy>,
     #[serde(flatten)]
-    judged: Judged,
+    judged: JudgedBank,
     /// Hertz, at the slow rate to which all frequencies alias.
     peak_hertz: Hertz,
     #[serde(skip)]
     is_normalised: bool,
-    iterations: usize,
     seconds: f64,
     #[serde(flatten)]
     proof: ProofReport,
@@ -51,7 +50,7 @@ pub(super) struct Report<'a> {
 
 /// What is computed of a finished bank for its report.
 #[derive(Debug, serde::Serialize)]
-pub(super) struct Judged {
+pub(super) struct JudgedBank {
     #[serde(flatten)]
     pub(super) mean: MeanAnalysis,
     pub(super) scale: GammaScale,
@@ -61,7 +60,7 @@ pub(super) struct Judged {
     pub(super) hint: Option<BandHint>,
 }
 
-impl Judged {
+impl JudgedBank {
     /// Of a bank with its spec.
     pub(super) fn new(bank: &Bank) -> Result<Self, DesignError> {
         let (mean, scale) = (analyze_mean(bank)?, GammaScale::new(bank, &[])?);
@@ -126,10 +125,14 @@ impl ProofReport {
     }
 }
 
-impl<'a> Report<'a> {
+impl<'a> DesignReport<'a> {
     /// Of a bank written to `output`, designed in so many seconds.
-    pub(super) fn new(output: String, design: &'a Design, judged: Judged, seconds: f64) -> Self {
+    pub(super) fn new(output: String, design: &'a Design, judged: JudgedBank, seconds: f64) -> Self {
         let bank = &design.bank;
+        let (reduction, robust) = match &design.study {
+            Study::Fir { robust, .. } => (None, robust.as_ref()),
+            Study::Recursive { reduction } => (reduction.as_ref(), None),
+        };
         let (taps, states) = match &bank.filters {
             SynthesisFilters::Fir(taps) => (taps.first().map(Vec::len), None),
             SynthesisFilters::StateSpace(block) => (None, Some(block.a.len())),
@@ -145,14 +148,13 @@ impl<'a> Report<'a> {
             taps,
             taps_chosen: design.sizing.taps_chosen,
             states,
-            reduction: design.reduction.as_ref(),
+            reduction,
             gamma: &bank.gamma,
-            words: Words::of(design),
-            robust: design.robust.as_ref(),
+            words: WordReport::of(design),
+            robust,
             judged,
             peak_hertz: design.peak_frequency.in_hertz(bank.slow_period()),
             is_normalised: bank.is_normalised(),
-            iterations: design.iterations,
             seconds,
             proof: ProofReport::of(design),
         }
@@ -171,19 +173,19 @@ impl<'a> Report<'a> {
             self.mean_text(),
             self.hint(),
             self.choice(),
-            self.words.as_ref().map(Words::text).unwrap_or_default(),
+            self.words.as_ref().map(WordReport::text).unwrap_or_default(),
             self.reduction.map(|reduction| order_text(reduction, self.method)).unwrap_or_default(),
             self.robust
                 .map(|study| robust_text(study, self.gamma.worst_case, self.proof.of_box()))
                 .unwrap_or_default(),
-            format!("designed in {:.1} ms, {}\n", self.seconds * 1e3, counted(self.iterations, "iteration")),
+            format!("designed in {:.1} ms\n", self.seconds * 1e3),
             self.proof.text(),
         ];
         parts.concat()
     }
 }
 
-impl Report<'_> {
+impl DesignReport<'_> {
     /// The sizes of the bank.
     fn heading(&self) -> String {
         let chosen = if self.latency_chosen { " (chosen; set `latency` to change it)" } else { "" };
@@ -200,7 +202,7 @@ impl Report<'_> {
 
     /// How integer taps were chosen for a loss.
     fn choice(&self) -> String {
-        self.words.as_ref().map(Words::choice_text).unwrap_or_default()
+        self.words.as_ref().map(WordReport::choice_text).unwrap_or_default()
     }
 
     fn hint(&self) -> String {

@@ -2,7 +2,9 @@
 
 use hybank::bank::{Bank, FixedPoint};
 use hybank::design::quantise::WordStudy;
-use hybank::design::{Design, DesignError, Options, OrderErrorPoint, OrderReduction, RobustStudy, design};
+use hybank::design::{
+    Design, DesignError, DesignOptions, OrderErrorPoint, OrderReduction, RobustStudy, Study, design,
+};
 use hybank::figures::{snr, target_band};
 use hybank::messages::counted;
 use hybank::overview::{band, decibels_of};
@@ -11,7 +13,7 @@ use hybank::units::{Decibels, Hertz};
 
 /// The increase of the error by integer taps.
 #[derive(Debug, serde::Serialize)]
-pub(super) struct Words<'a> {
+pub(super) struct WordReport<'a> {
     bits: &'a WordLengths,
     fraction_bits: i32,
     /// gamma of these integers over that of the real taps, both computed, in decibels.
@@ -20,9 +22,10 @@ pub(super) struct Words<'a> {
     study: &'a WordStudy,
 }
 
-impl<'a> Words<'a> {
+impl<'a> WordReport<'a> {
     pub(super) fn of(design: &'a Design) -> Option<Self> {
-        let (integers, study) = design.bank.fixed_point.as_ref().zip(design.words.as_ref())?;
+        let Study::Fir { words: Some(study), .. } = &design.study else { return None };
+        let integers = design.bank.fixed_point.as_ref()?;
         let loss_db = study.loss_db(design.bank.gamma.norm?);
         let FixedPoint { bits, fraction_bits, .. } = integers;
         Some(Self { bits, fraction_bits: *fraction_bits, loss_db, study })
@@ -176,7 +179,7 @@ impl BandHint {
         let Some(band) = target_band(&spec)?.filter(|_| seconds < MOST_HINT_SECONDS) else { return Ok(None) };
         let signal = Some(SignalSpec::in_band(band));
         let wanted = Spec { signal, ..spec };
-        let Ok(other) = design(&wanted, &Options::without_proof()) else { return Ok(None) };
+        let Ok(other) = design(&wanted, &DesignOptions::without_proof()) else { return Ok(None) };
         let instead_of_db = snr(&Bank { spec: Some(wanted), ..found.bank.clone() })?.total_db;
         let snr_db = snr(&other.bank)?.total_db;
         Ok((snr_db - instead_of_db >= LEAST_BAND_GAIN).then_some(Self {

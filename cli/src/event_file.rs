@@ -20,7 +20,7 @@ pub(super) struct EventFile {
 
 /// An event with its time.
 #[derive(Serialize)]
-struct Line<'a, T> {
+struct EventLine<'a, T> {
     /// Seconds since the run began.
     at: f64,
     event: &'a str,
@@ -50,7 +50,7 @@ impl EventFile {
     pub(super) fn write(&mut self, event: &str, data: &impl Serialize) {
         let Some(file) = self.file.as_mut().filter(|_| self.error.is_none()) else { return };
         let at = (self.begun.elapsed().as_secs_f64() * 1e3).round() / 1e3;
-        let written = serde_json::to_string(&Line { at, event, data })
+        let written = serde_json::to_string(&EventLine { at, event, data })
             .map_err(io::Error::other)
             .and_then(|text| file.write_all((text + "\n").as_bytes()));
         self.error = written.err();

@@ -132,7 +132,7 @@ impl VerilogArgs {
 
 /// What was written.
 #[derive(Debug, serde::Serialize)]
-struct Report {
+struct ExportReport {
     output: String,
     /// The folder of a testbench.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -167,7 +167,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     match args.json {
         true => {
             let testbench = args.verilog.testbench.as_ref().map(|folder| folder.display().to_string());
-            print_json(&Report { output: args.output.display().to_string(), testbench, circuit })
+            print_json(&ExportReport { output: args.output.display().to_string(), testbench, circuit })
         }
         false => Ok(()),
     }

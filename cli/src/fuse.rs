@@ -7,7 +7,7 @@ use super::capture_args::CaptureArgs;
 use super::observer::RunObserver;
 use super::output::{bits, check_files, container_of};
 use super::print::{Failure, is_dash, print, print_report, say_understood};
-use super::run::{Finished, Job, RunArgs, RunReport};
+use super::run::{BankRun, Finished, RunArgs, RunReport};
 use super::tracked::{self, TrackArgs};
 use hybank::bank::Bank;
 use hybank::io::{Container, MultiReader, OnStall, PcmFormat};
@@ -64,7 +64,7 @@ pub(super) struct Args {
 
 /// The report of a run.
 #[derive(Debug, serde::Serialize)]
-struct Report<'a> {
+struct FusionReport<'a> {
     #[serde(flatten)]
     run: &'a RunReport,
     /// Hertz of the output, rounded.
@@ -97,7 +97,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.fuse(&job, &mut observer).inspect_err(|failure| observer.fail(failure))
 }
 
-impl Report<'_> {
+impl FusionReport<'_> {
     /// The figures of --measure; what was written, and whether the captures agree with the bank.
     fn text(&self, output: &Path) -> String {
         let figures = self.measure.as_ref().map_or_else(String::new, before_after::text);
@@ -129,8 +129,8 @@ impl Args {
         self.run.check(&self.bank, &self.inputs, &self.output, container_of(&self.output), prints)
     }
 
-    fn job<'a>(&'a self, bank: &'a Bank) -> Job<'a> {
-        Job {
+    fn job<'a>(&'a self, bank: &'a Bank) -> BankRun<'a> {
+        BankRun {
             args: &self.run,
             bank,
             bank_path: &self.bank,
@@ -144,7 +144,7 @@ impl Args {
         }
     }
 
-    fn fuse(&self, job: &Job<'_>, observer: &mut RunObserver) -> Result<(), Failure> {
+    fn fuse(&self, job: &BankRun<'_>, observer: &mut RunObserver) -> Result<(), Failure> {
         let begin = Instant::now();
         if self.track.has_stamps() {
             return tracked::fuse_stamps(job, &self.inputs, &self.reading.format());
@@ -165,7 +165,7 @@ impl Args {
         let measure = self.measured(job)?;
         let Finished { report: run, frames, dropped: latency_dropped, peak, captures, .. } = &finished;
         let (rate, frames, latency_dropped, peak) = (rate.round() as u64, *frames, *latency_dropped, *peak);
-        let report = Report { run, rate, frames, latency_dropped, peak, captures, seconds, measure };
+        let report = FusionReport { run, rate, frames, latency_dropped, peak, captures, seconds, measure };
         observer.end(&report)?;
         if self.run.json {
             return print_report(&report, &self.output);
@@ -178,12 +178,12 @@ impl Args {
         print(&report.text(&self.output))
     }
 
-    fn start_reader(&self, job: &Job<'_>, on_stall: OnStall<'_>) -> Result<MultiReader, Failure> {
+    fn start_reader(&self, job: &BankRun<'_>, on_stall: OnStall<'_>) -> Result<MultiReader, Failure> {
         job.start_reader(&self.inputs, self.reading.format(), on_stall)
     }
 
     /// Reads the inputs once more, and the output.
-    fn measured(&self, job: &Job<'_>) -> Result<Option<BeforeAfter>, Failure> {
+    fn measured(&self, job: &BankRun<'_>) -> Result<Option<BeforeAfter>, Failure> {
         if !self.before_after.is_wanted() {
             return Ok(None);
         }

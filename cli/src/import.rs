@@ -1,7 +1,7 @@
 //! `hybank import`: filters of other tools, judged like our own.
 
 use super::bank_file::load_spec_or_bank;
-use super::design_report::{Judged, Report};
+use super::design_report::{DesignReport, JudgedBank};
 use super::print::{Failure, InFile, failed, failed_at, show, warn};
 use super::written::{check_output, write_text};
 use hybank::design::{self, ProofSearch};
@@ -58,11 +58,11 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let taps = read(&args.taps)?;
     let begin = Instant::now();
     let found = design::judge_taps(&spec, taps, ProofSearch::Run).in_file(&args.taps)?;
-    let judged = Judged::new(&found.bank).in_file(&args.taps)?;
+    let judged = JudgedBank::new(&found.bank).in_file(&args.taps)?;
     judged.warnings(&found.bank).iter().for_each(|warning| warn(warning));
     write_text(&args.output, &found.bank.to_json().map_err(failed)?, args.force)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
-    let report = Report::new(args.output.display().to_string(), &found, judged, seconds);
+    let report = DesignReport::new(args.output.display().to_string(), &found, judged, seconds);
     show(&report, args.json, |report| report.text(args.verbose))
 }
 

@@ -1,17 +1,18 @@
 //! `hybank measure`: the quality of a recording.
 
 use super::capture_args::{CaptureArgs, check_stdin};
-use super::capture_file::{CaptureFile, MOST_MEASURED, Reading};
+use super::capture_file::{CaptureFile, MOST_MEASURED, ReadingRules};
 use super::choice::{Choice, one_of};
 use super::plot::{check_picture, write_picture};
 use super::print::{Failure, InFile, failed_at, is_dash, name, show, warn};
 use super::written::check_output;
 use hybank::io::is_same_rate;
 use hybank::measure::{
-    Comparison, Imbalance, Measurement, Quadrature, Settings, Spectrum, Spur, Warning, Window, compare,
+    Comparison, Imbalance, MeasureWarning, Measurement, Quadrature, RecordSpectrum, Settings, Spur, Window,
+    compare,
 };
 use hybank::messages::Quoted;
-use hybank::overview::{Drawn, Figure, causes, column, spur_chart};
+use hybank::overview::{DrawnRecording, Figure, causes, column, spur_chart};
 use hybank::quantity::{self, readable};
 use hybank::units::Hertz;
 use std::fmt::Write as _;
@@ -123,22 +124,23 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let measurement = measurement.transpose().in_file(&args.file)?;
     let reference = args.reference.as_ref().map(|path| args.compared(&capture, path)).transpose()?;
     let warnings = measurement.as_ref().map(warnings).unwrap_or_default();
-    let report = Report { file: name(&args.file), measurement, reference, warnings };
+    let report = MeasureReport { file: name(&args.file), measurement, reference, warnings };
     if let Some(path) = &args.plot {
         let comparison = report.reference.as_ref().map(|of| (of.file.as_str(), &of.comparison));
-        let drawn = Drawn { label: &report.file, measurement: report.measurement.as_ref(), comparison };
+        let drawn =
+            DrawnRecording { label: &report.file, measurement: report.measurement.as_ref(), comparison };
         let chart = spur_chart(drawn, &settings, || spectrum(&capture, settings.window));
         write_picture(path, &chart, args.force)?;
     }
     report.warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", Quoted(&report.file))));
-    show(&report, args.json, Report::text)
+    show(&report, args.json, MeasureReport::text)
 }
 
 /// What is not finite counts as 0.
-fn spectrum(capture: &CaptureFile, window: Window) -> Spectrum {
+fn spectrum(capture: &CaptureFile, window: Window) -> RecordSpectrum {
     let samples = capture.channel.samples.iter();
     let finite: Vec<f64> = samples.map(|x| if x.is_finite() { *x } else { 0.0 }).collect();
-    Spectrum::new(&finite, capture.rate, window)
+    RecordSpectrum::new(&finite, capture.rate, window)
 }
 
 /// What `--window` takes.
@@ -166,10 +168,10 @@ impl Args {
         check_stdin(inputs.into_iter())
     }
 
-    fn reading(&self) -> Reading {
+    fn reading(&self) -> ReadingRules {
         let mut options = self.reading.format().options(1, 1);
         options.table.is_rate_known = self.rate.is_some();
-        Reading { options, rate: self.rate, most: MOST_MEASURED, takes_complex: true }
+        ReadingRules { options, rate: self.rate, most: MOST_MEASURED, takes_complex: true }
     }
 
     fn settings(&self) -> Result<Settings, Failure> {
@@ -185,7 +187,7 @@ impl Args {
     fn compared(&self, capture: &CaptureFile, path: &Path) -> Result<ReferenceReport, Failure> {
         let mut options = self.reading.of_reference(&self.file, path);
         options.table.is_rate_known = self.rate.is_some();
-        let reading = Reading { options, takes_complex: false, ..self.reading() };
+        let reading = ReadingRules { options, takes_complex: false, ..self.reading() };
         let reference = CaptureFile::read(path, reading)?.trimmed(path, self.skip)?;
         let file = Quoted(name(&self.file));
         let (own, other) = (capture.rate, reference.rate);
@@ -209,7 +211,7 @@ const MOST_SPURS: usize = 20;
 
 /// What the command found.
 #[derive(Debug, serde::Serialize)]
-struct Report {
+struct MeasureReport {
     file: String,
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     measurement: Option<Measurement>,
@@ -228,14 +230,14 @@ struct ReferenceReport {
 
 /// What the user should know beside the figures.
 fn warnings(measured: &Measurement) -> Vec<String> {
-    let text = |warning: Warning| match &warning {
-        Warning::Unsettled(ends) => format!("{warning}; --skip {} leaves them out", ends.samples),
+    let text = |warning: MeasureWarning| match &warning {
+        MeasureWarning::Unsettled(ends) => format!("{warning}; --skip {} leaves them out", ends.samples),
         _ => warning.to_string(),
     };
     measured.warnings().into_iter().map(text).collect()
 }
 
-impl Report {
+impl MeasureReport {
     fn text(&self) -> String {
         let mut text = String::new();
         if let Some(measured) = &self.measurement {

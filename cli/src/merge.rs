@@ -10,9 +10,9 @@ use hybank::captures::Captures;
 use hybank::files::commit_all;
 use hybank::io::table::read_stamped;
 use hybank::io::{Container, PcmFormat};
-use hybank::merge::{Found, MergeSettings, Merged, Source, merge};
+use hybank::merge::{MergeSettings, Merged, Recorder, SourceEstimate, merge};
 use hybank::messages::{Quoted, counted};
-use hybank::quantity::{self, Time, readable};
+use hybank::quantity::{self, WrittenTime, readable};
 use hybank::sine_fit::Estimate;
 use hybank::units::Hertz;
 use std::fmt::Write as _;
@@ -54,7 +54,7 @@ pub(super) struct Args {
     flat: bool,
     /// How far apart the recordings began at most, as 50ms or 2s
     #[arg(long, value_name = "TIME", value_parser = quantity::time)]
-    within: Option<Time>,
+    within: Option<WrittenTime>,
     /// Samples of the WAV file: integers, or floats
     #[arg(long, value_parser = bits(), default_value = "32f")]
     bits: PcmFormat,
@@ -84,7 +84,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let merged = merge(&sources, settings).map_err(failed)?;
     warnings.extend(merged.warnings.iter().map(ToString::to_string));
     warnings.extend(args.write(&merged, origin)?);
-    let report = Report::new(names, &merged, warnings);
+    let report = MergeReport::new(names, &merged, warnings);
     report.warnings.iter().for_each(|text| warn(text));
     if is_dash(&args.output) { Ok(()) } else { show(&report, args.json, |report| report.text(&args.output)) }
 }
@@ -103,7 +103,7 @@ impl Args {
     }
 
     /// All recordings; what was tolerated joins the `warnings`.
-    fn sources(&self, warnings: &mut Vec<String>) -> Result<Vec<Source>, Failure> {
+    fn sources(&self, warnings: &mut Vec<String>) -> Result<Vec<Recorder>, Failure> {
         let mut sources = Vec::new();
         for path in &self.recordings {
             match self.stamped(path)? {
@@ -115,7 +115,7 @@ impl Args {
     }
 
     /// The columns of a table with time stamps; `None` if the file is none.
-    fn stamped(&self, path: &Path) -> Result<Option<Vec<Source>>, Failure> {
+    fn stamped(&self, path: &Path) -> Result<Option<Vec<Recorder>>, Failure> {
         if is_dash(path) || !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
             return Ok(None);
         }
@@ -127,7 +127,7 @@ impl Args {
         };
         let rate = Hertz((table.stamps.len() - 1) as f64 / (*last - *first).0);
         let many = table.columns.len() > 1;
-        let source = |(k, samples): (usize, Vec<f64>)| Source {
+        let source = |(k, samples): (usize, Vec<f64>)| Recorder {
             name: if many { format!("{} column {}", name(path), k + 2) } else { name(path) },
             record: hybank::calibrate::Record::new(samples),
             rate,
@@ -137,7 +137,7 @@ impl Args {
         Ok(Some(table.columns.into_iter().enumerate().map(source).collect()))
     }
 
-    fn recorded(&self, path: &Path, warnings: &mut Vec<String>) -> Result<Source, Failure> {
+    fn recorded(&self, path: &Path, warnings: &mut Vec<String>) -> Result<Recorder, Failure> {
         let mut reader = start(&[path.to_path_buf()], self.reading.format().options(1, 1))?;
         Captures::check_mono(&reader).map_err(unread)?;
         let format = reader.headers().next().map(|(_, header)| header.layout.format);
@@ -156,7 +156,7 @@ impl Args {
         // A step of integers, of which full scale is 1.
         let integer = format.filter(|format| !format.is_float());
         let step = integer.map_or(0.0, |format| 2.0_f64.powi(1 - 8 * format.bytes() as i32));
-        Ok(Source { name: name(path), record, rate, step, stamps: None })
+        Ok(Recorder { name: name(path), record, rate, step, stamps: None })
     }
 
     /// Writes the result, and says what could not be kept; times of a table count from that of the first
@@ -179,7 +179,7 @@ impl Args {
 
 /// The report of merged recordings.
 #[derive(Debug, serde::Serialize)]
-struct Report {
+struct MergeReport {
     /// Samples of the result, and how many each second.
     samples: usize,
     rate: f64,
@@ -219,7 +219,7 @@ struct StepReport {
 }
 
 impl RecordingReport {
-    fn new(name: String, found: &Found, alone_db: f64) -> Self {
+    fn new(name: String, found: &SourceEstimate, alone_db: f64) -> Self {
         let ppm = |drift: Estimate<f64>| Estimate { value: 1e6 * drift.value, sigma: 1e6 * drift.sigma };
         Self {
             name,
@@ -237,7 +237,7 @@ impl RecordingReport {
     }
 }
 
-impl Report {
+impl MergeReport {
     fn new(names: Vec<String>, merged: &Merged, warnings: Vec<String>) -> Self {
         let quality = &merged.quality;
         let all = names.into_iter().zip(&merged.sources).zip(&quality.alone);

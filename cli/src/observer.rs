@@ -94,8 +94,8 @@ struct Counts {
 
 impl Counts {
     /// What was replaced and clipped until `later`.
-    fn spans(&self, later: &Self) -> impl Iterator<Item = Span> {
-        let span = |event, first: u64, end: u64, samples| Span {
+    fn spans(&self, later: &Self) -> impl Iterator<Item = EventSpan> {
+        let span = |event, first: u64, end: u64, samples| EventSpan {
             event,
             first,
             last: end.saturating_sub(1).max(first),
@@ -109,7 +109,7 @@ impl Counts {
 
 /// Some of the samples (of the output) or frames (of the input) from `first` to `last`, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-struct Span {
+struct EventSpan {
     /// `replaced` (input samples that were NaN or infinite became 0) or `clipped` (output samples
     /// saturated).
     #[serde(skip)]
@@ -120,7 +120,7 @@ struct Span {
     samples: u64,
 }
 
-impl fmt::Display for Span {
+impl fmt::Display for EventSpan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { event, first, last, samples } = self;
         match *event {

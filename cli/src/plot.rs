@@ -4,7 +4,7 @@ use super::bank_file::load;
 use super::print::{Failure, InFile, print};
 use super::written::{begin_file, check_folder, check_outputs, write_bytes, write_together};
 use hybank::bank::Bank;
-use hybank::design::{DesignError, Options, design};
+use hybank::design::{DesignError, DesignOptions, design};
 use hybank::messages::Quoted;
 use hybank::overview::{Picture, pictures};
 use hybank::plot::{Chart, Series};
@@ -126,7 +126,7 @@ fn by_taps(taps: usize, plain: &Spec) -> Vec<(f64, f64)> {
 /// gamma of a design in decibels; none where there is no such bank, as for latencies that the taps do not
 /// reach.
 fn point(at: usize, spec: &Spec) -> Option<(f64, f64)> {
-    let gamma = design(spec, &Options::without_proof()).ok()?.bank.gamma.norm?;
+    let gamma = design(spec, &DesignOptions::without_proof()).ok()?.bank.gamma.norm?;
     (gamma > 0.0).then(|| (at as f64, 20.0 * gamma.log10()))
 }
 

@@ -3,7 +3,7 @@
 //! names keys of the spec and fields, because its errors are also read in Python, in C and in a browser.
 
 use hybank::align::AlignError;
-use hybank::calibrate::{CalibrateError, Warning};
+use hybank::calibrate::{CalibrateError, CalibrationWarning};
 use hybank::design::DesignError;
 use hybank::files::FileError;
 use hybank::interchange::ExportError;
@@ -160,8 +160,8 @@ fn option(error: &dyn Any) -> Option<&'static str> {
         .or_else(|| of_proof(error.downcast_ref()?))
         .or_else(|| of_calibration(error.downcast_ref()?))
         .or_else(|| match error.downcast_ref()? {
-            Warning::CutoffExplains { .. } => Some("--fit takes that list"),
-            Warning::OffsetBinary => Some("--full-scale u8bits does the same"),
+            CalibrationWarning::CutoffExplains { .. } => Some("--fit takes that list"),
+            CalibrationWarning::OffsetBinary => Some("--full-scale u8bits does the same"),
             _ => None,
         })
         .or_else(|| match error.downcast_ref()? {

@@ -95,7 +95,7 @@ impl RunArgs {
 }
 
 /// A run: a bank, and what becomes of the outputs.
-pub(super) struct Job<'a> {
+pub(super) struct BankRun<'a> {
     pub(super) args: &'a RunArgs,
     pub(super) bank: &'a Bank,
     pub(super) bank_path: &'a Path,
@@ -126,7 +126,7 @@ pub(super) struct Finished {
     pub(super) captures: String,
 }
 
-impl Job<'_> {
+impl BankRun<'_> {
     /// Begins to read inputs of this format.
     pub(super) fn start_reader(
         &self,

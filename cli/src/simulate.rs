@@ -3,14 +3,14 @@
 use super::bank_file::load_spec_or_bank;
 use super::print::{Failure, InFile, show, warn};
 use super::virtual_converters::{CommonReport, ConverterReport, ErrorArgs, bad_error, integers};
-use super::virtual_signal::{Signal, SignalArgs};
+use super::virtual_signal::{DescribedSignal, SignalArgs};
 use super::written::{Mono, begin_recording, check_outputs, write_together};
 use hybank::design::Problem;
 use hybank::io::{Container, PcmFormat, SampleWriter, is_same_rate};
 use hybank::messages::{Quoted, counted};
 use hybank::overview::understood;
 use hybank::quantity::readable;
-use hybank::simulate::Converter;
+use hybank::simulate::Sampler;
 use hybank::spec::{ChannelSpec, Spec};
 use hybank::units::Hertz;
 use std::path::PathBuf;
@@ -53,7 +53,7 @@ pub(super) struct Args {
     output: PathBuf,
     /// Kind of the files [default: wav, of complex samples sigmf]
     #[arg(long, value_name = "KIND")]
-    to: Option<Kind>,
+    to: Option<CaptureKind>,
     /// Fast samples to simulate, rounded up to whole frames [default: to the end of the source, at least
     /// 200]
     #[arg(long)]
@@ -72,7 +72,7 @@ pub(super) struct Args {
 }
 
 #[derive(Debug, serde::Serialize)]
-struct Report {
+struct SimulationReport {
     /// The spec in units of the user.
     understood: String,
     /// The analog signal, in hertz and seconds.
@@ -102,7 +102,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let errors = args.errors.errors();
     let truth = errors.true_spec(&spec).map_err(|refused| bad_error(&refused))?;
     let problem = Problem::new(&Spec { signal: None, ..truth }, spec.wait()).in_file(&args.spec)?;
-    let signal = Signal::read(&args.signal, &spec)?;
+    let signal = DescribedSignal::read(&args.signal, &spec)?;
     let kind = args.kind(signal.is_complex())?;
     let (rates, mut warnings) = Rates::of(&spec, kind).in_file(&args.spec)?;
     warnings.extend(signal.warning(&spec));
@@ -113,7 +113,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check_outputs(&outputs)?;
     let reports = spec.channels.iter().zip(&converters);
     let mut reports: Vec<_> = reports.map(|(of, each)| ConverterReport::new(of, &each.errors)).collect();
-    let run = Run { args, problem: &problem, signal: &signal, frames };
+    let run = CaptureRun { args, problem: &problem, signal: &signal, frames };
     let captures = converters.iter().zip(&mut reports).enumerate();
     let captures = captures.map(|(i, (each, report))| run.capture(i, &each.converter, &mut report.clipped));
     let recordings = outputs.iter().zip(captures.chain(std::iter::once_with(|| run.target())));
@@ -123,7 +123,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     warnings.extend(clipped.map(|(file, report)| {
         format!("{}: {} samples were clipped at full scale", Quoted(file), report.clipped)
     }));
-    let report = Report {
+    let report = SimulationReport {
         understood: understood(&spec),
         is_complex: signal.is_complex(),
         source: signal.text,
@@ -137,7 +137,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         warnings,
     };
     report.warnings.iter().for_each(|warning| warn(warning));
-    show(&report, args.json, Report::text)
+    show(&report, args.json, SimulationReport::text)
 }
 
 /// A rate, or one for each converter, with its unit.
@@ -149,33 +149,33 @@ fn rate(hertz: &serde_json::Value) -> String {
 }
 
 /// Real parts, and imaginary parts of complex samples.
-type Parts = (Vec<f64>, Option<Vec<f64>>);
+type SampleParts = (Vec<f64>, Option<Vec<f64>>);
 
 /// What is captured.
-struct Run<'a> {
+struct CaptureRun<'a> {
     args: &'a Args,
     problem: &'a Problem,
-    signal: &'a Signal,
+    signal: &'a DescribedSignal,
     frames: usize,
 }
 
-impl Run<'_> {
+impl CaptureRun<'_> {
     /// The samples of channel `i`, and how many of their parts `clipped`.
-    fn capture(&self, i: usize, converter: &Converter, clipped: &mut usize) -> Parts {
+    fn capture(&self, i: usize, converter: &Sampler, clipped: &mut usize) -> SampleParts {
         let Self { problem, signal, frames, .. } = *self;
         let delivered = signal.analog.captured(problem, i, converter, self.args.gain, frames);
         *clipped = delivered.clipped;
         (delivered.samples, delivered.imaginary)
     }
 
-    fn target(&self) -> Parts {
+    fn target(&self) -> SampleParts {
         self.signal.analog.target(self.problem, self.args.gain, self.frames)
     }
 
     /// All files appear together or not at all.
     fn write<'o>(
         &self,
-        recordings: impl Iterator<Item = (&'o Output, Parts)>,
+        recordings: impl Iterator<Item = (&'o OutputFile, SampleParts)>,
         container: Container,
     ) -> Result<(), Failure> {
         let checked = recordings.map(|(output, samples)| Ok((output, self.checked(samples)?)));
@@ -187,7 +187,7 @@ impl Run<'_> {
     }
 
     /// A sample beyond the range of a 32-bit float is an error, not an infinity in the file.
-    fn checked(&self, parts: Parts) -> Result<Parts, Failure> {
+    fn checked(&self, parts: SampleParts) -> Result<SampleParts, Failure> {
         let mut all = parts.0.iter().chain(parts.1.iter().flatten());
         match all.find(|x| x.is_nan() || x.abs() > f64::from(f32::MAX)) {
             None => Ok(parts),
@@ -204,33 +204,34 @@ impl Run<'_> {
 
 impl Args {
     /// The kind of the files that are written.
-    fn kind(&self, is_complex: bool) -> Result<Kind, Failure> {
+    fn kind(&self, is_complex: bool) -> Result<CaptureKind, Failure> {
         match self.to {
-            Some(Kind::Wav) if is_complex => Err(Failure::Usage(
+            Some(CaptureKind::Wav) if is_complex => Err(Failure::Usage(
                 "--to wav: WAV files hold no complex samples; leave it out for SigMF recordings, or take --to raw"
                     .into(),
             )),
             Some(kind) => Ok(kind),
-            None => Ok(if is_complex { Kind::Sigmf } else { Kind::Wav }),
+            None => Ok(if is_complex { CaptureKind::Sigmf } else { CaptureKind::Wav }),
         }
     }
 
     /// The recordings of the channels and of the target, in this order.
-    fn outputs(&self, kind: Kind, is_complex: bool, rates: &Rates) -> Vec<Output> {
+    fn outputs(&self, kind: CaptureKind, is_complex: bool, rates: &Rates) -> Vec<OutputFile> {
         // A WAV file has the integers of the converters.
-        let codes = integers(self.errors.bits).filter(|_| kind == Kind::Wav).unwrap_or(PcmFormat::F32Le);
+        let codes =
+            integers(self.errors.bits).filter(|_| kind == CaptureKind::Wav).unwrap_or(PcmFormat::F32Le);
         let slow = rates.slow.iter().zip(1..).map(|(&rate, i)| (format!("ch{i}"), rate, codes));
         let names = slow.chain([("target".to_owned(), rates.fast, PcmFormat::F32Le)]);
         let extension = kind.extension(is_complex);
         let output = |(name, rate, format): (String, f64, PcmFormat)| {
             let path = self.output.join(format!("{name}.{extension}"));
-            Output { path, rate, format }
+            OutputFile { path, rate, format }
         };
         names.map(output).collect()
     }
 
     /// Refuses outputs that are inputs.
-    fn check_outputs(&self, outputs: &[Output]) -> Result<(), Failure> {
+    fn check_outputs(&self, outputs: &[OutputFile]) -> Result<(), Failure> {
         let files: Vec<_> = outputs.iter().flat_map(|output| SampleWriter::files(&output.path)).collect();
         let files: Vec<_> = files.iter().map(PathBuf::as_path).collect();
         let inputs: Vec<_> = std::iter::once(self.spec.as_path()).chain(self.signal.names()).collect();
@@ -238,7 +239,7 @@ impl Args {
     }
 }
 
-impl Report {
+impl SimulationReport {
     fn text(&self) -> String {
         let each = self.converters.iter().zip(1..).map(|(converter, channel)| converter.text(channel));
         let each: String = each.collect();
@@ -260,7 +261,7 @@ const NORMALISED_RATE: Hertz = Hertz(48_000.0);
 
 /// The kind of the files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Kind {
+enum CaptureKind {
     /// ch1.wav, real samples only
     Wav,
     /// ch1.sigmf-meta and ch1.sigmf-data
@@ -269,7 +270,7 @@ enum Kind {
     Raw,
 }
 
-impl Kind {
+impl CaptureKind {
     fn container(self) -> Container {
         if self == Self::Raw { Container::Raw } else { Container::Wav }
     }
@@ -285,7 +286,7 @@ impl Kind {
 }
 
 /// A recording to be written.
-struct Output {
+struct OutputFile {
     path: PathBuf,
     /// Hertz.
     rate: f64,
@@ -301,7 +302,7 @@ struct Rates {
 
 impl Rates {
     /// Of a spec; WAV headers hold whole hertz, and the warnings say so.
-    fn of(spec: &Spec, kind: Kind) -> Result<(Self, Vec<String>), String> {
+    fn of(spec: &Spec, kind: CaptureKind) -> Result<(Self, Vec<String>), String> {
         let ratio = spec.ratio as f64;
         let frames = if spec.is_normalised() {
             (NORMALISED_RATE / ratio).0.round().max(1.0)
@@ -318,7 +319,7 @@ impl Rates {
             false => spec.fast_period.rate().0,
         };
         let exact = Self { slow, fast };
-        if kind == Kind::Wav { exact.whole() } else { Ok((exact, Vec::new())) }
+        if kind == CaptureKind::Wav { exact.whole() } else { Ok((exact, Vec::new())) }
     }
 
     fn whole(self) -> Result<(Self, Vec<String>), String> {

@@ -4,7 +4,7 @@ use super::capture_args::{ScaleArgs, check_channels, coding};
 use super::observer::RunObserver;
 use super::output::is_wav;
 use super::print::{print_report, say_line, say_understood};
-use super::run::{Finished, Job, RunArgs, RunReport};
+use super::run::{BankRun, Finished, RunArgs, RunReport};
 use super::table_args::TableArgs;
 use super::{Failure, bank_file};
 use hybank::bank::Bank;
@@ -80,7 +80,7 @@ fn output_coding(name: &str) -> Result<Coding, String> {
 
 /// The report of a run.
 #[derive(Debug, serde::Serialize)]
-struct Report<'a> {
+struct StreamReport<'a> {
     #[serde(flatten)]
     run: &'a RunReport,
     /// Input frames read.
@@ -110,8 +110,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 }
 
 impl Args {
-    fn job<'a>(&'a self, bank: &'a Bank) -> Job<'a> {
-        Job {
+    fn job<'a>(&'a self, bank: &'a Bank) -> BankRun<'a> {
+        BankRun {
             args: &self.run,
             bank,
             bank_path: &self.bank,
@@ -126,7 +126,12 @@ impl Args {
         }
     }
 
-    fn stream(&self, job: &Job<'_>, inputs: &[PathBuf], observer: &mut RunObserver) -> Result<(), Failure> {
+    fn stream(
+        &self,
+        job: &BankRun<'_>,
+        inputs: &[PathBuf],
+        observer: &mut RunObserver,
+    ) -> Result<(), Failure> {
         // Before the inputs come; their headers may say complex samples.
         let plan = job.plan()?;
         let channels = self.channels.map(usize::from);
@@ -142,7 +147,7 @@ impl Args {
         self.check_output(reader.is_complex())?;
         let finished = job.run(&plan, &mut reader, observer, &|_| {})?;
         let Finished { report: run, frames, is_interrupted, .. } = &finished;
-        let report = Report { run, frames: *frames, interrupted: *is_interrupted };
+        let report = StreamReport { run, frames: *frames, interrupted: *is_interrupted };
         observer.end(&report)?;
         let printed = if self.run.json { print_report(&report, &self.output) } else { Ok(()) };
         if *is_interrupted && printed.is_ok() {

@@ -108,11 +108,11 @@ Examples:
 pub(super) struct SchemaArgs {
     /// What the schema is of
     #[arg(value_enum)]
-    of: Kind,
+    of: TextKind,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Kind {
+enum TextKind {
     /// Spec files (TOML)
     Spec,
     /// Bank files (JSON)
@@ -127,9 +127,9 @@ const REPORT_SCHEMA: &str = include_str!("schema/report.json");
 
 pub(super) fn schema(args: &SchemaArgs) -> Result<(), Failure> {
     match args.of {
-        Kind::Spec => print(SPEC_SCHEMA),
-        Kind::Bank => print(&with_spec()?),
-        Kind::Report => print(REPORT_SCHEMA),
+        TextKind::Spec => print(SPEC_SCHEMA),
+        TextKind::Bank => print(&with_spec()?),
+        TextKind::Report => print(REPORT_SCHEMA),
     }
 }
 

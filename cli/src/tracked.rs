@@ -2,7 +2,7 @@
 
 use super::capture_file::unread;
 use super::print::{Failure, check_strict, failed, failed_at, is_dash, print, print_report, warn};
-use super::run::Job;
+use super::run::BankRun;
 use super::written::{Mono, begin_recording};
 use hybank::bank::Bank;
 use hybank::captures::{Captures, Converters, FileFormat};
@@ -39,7 +39,7 @@ pub(super) struct TrackArgs {
 }
 
 #[derive(Debug, serde::Serialize)]
-struct Report {
+struct TrackedReport {
     samples: usize,
     rate: f64,
     /// When the first sample was taken: after the first frame, or by the stamps.
@@ -64,7 +64,7 @@ impl TrackArgs {
 }
 
 /// Fuses what `reader` gives by the delays of a table.
-pub(super) fn fuse(job: &Job<'_>, table: &Path, mut reader: MultiReader) -> Result<(), Failure> {
+pub(super) fn fuse(job: &BankRun<'_>, table: &Path, mut reader: MultiReader) -> Result<(), Failure> {
     let track = read(table, job.bank)?;
     let rate = job.output_rate(&reader)?;
     if reader.is_complex() {
@@ -139,7 +139,7 @@ fn read(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
 
 /// A line of `drift.jsonl`.
 #[derive(Debug, serde::Deserialize)]
-struct Line {
+struct DriftLine {
     frame: u64,
     /// D_i in seconds; of a channel of which the line says nothing none.
     delay: Vec<Option<f64>>,
@@ -150,7 +150,8 @@ fn read_lines(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
     let (mut times, mut delays) = (Vec::new(), vec![Vec::new(); bank.channel_count()]);
     for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let refused = |problem: String| failed_at(path, format!("line {}: {problem}", number + 1));
-        let Line { frame, delay } = serde_json::from_str(line).map_err(|error| refused(error.to_string()))?;
+        let DriftLine { frame, delay } =
+            serde_json::from_str(line).map_err(|error| refused(error.to_string()))?;
         if delay.len() != delays.len() {
             return Err(refused(format!("{} for {} channels", counted(delay.len(), "delay"), delays.len())));
         }
@@ -162,8 +163,8 @@ fn read_lines(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
     Ok(DelayTrack { times, delays })
 }
 
-fn report(job: &Job<'_>, tracked: &Tracked, rate: f64, warnings: Vec<String>) -> Result<(), Failure> {
-    let report = Report {
+fn report(job: &BankRun<'_>, tracked: &Tracked, rate: f64, warnings: Vec<String>) -> Result<(), Failure> {
+    let report = TrackedReport {
         samples: tracked.samples.len(),
         rate,
         begin: tracked.begin.0,

@@ -41,7 +41,7 @@ pub(super) struct Args {
 }
 
 #[derive(Debug, serde::Serialize)]
-struct Report {
+struct VerifyReport {
     bank: String,
     #[serde(flatten)]
     verified: Verified,
@@ -68,7 +68,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     } else {
         verify(&bank).in_file(&args.bank)?
     };
-    let report = Report {
+    let report = VerifyReport {
         words: words(&bank),
         worst_case: bank.gamma.worst_case,
         bank: file,
@@ -76,7 +76,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         digest,
         certificate_in_file,
     };
-    show(&report, args.json, Report::text)
+    show(&report, args.json, VerifyReport::text)
 }
 
 /// The word lengths as text; reading has checked them.
@@ -87,7 +87,7 @@ fn words(bank: &Bank) -> String {
     bank.fixed_point.as_ref().map(line).unwrap_or_default()
 }
 
-impl Report {
+impl VerifyReport {
     fn text(&self) -> String {
         let Verified { upper, attained, states } = self.verified;
         let origin = if self.certificate_in_file { "from the file" } else { "found now, the file has none" };

@@ -2,8 +2,8 @@
 
 use super::print::Failure;
 use hybank::io::PcmFormat;
-use hybank::quantity::{self, Time, readable};
-use hybank::simulate::{ConverterErrors, ErrorRule, ErrorsOfConverter, RefusedError};
+use hybank::quantity::{self, WrittenTime, readable};
+use hybank::simulate::{ErrorLists, ErrorRule, ErrorsOfConverter, RefusedError};
 use hybank::spec::{ChannelSpec, Spec};
 use hybank::units::Seconds;
 
@@ -20,13 +20,13 @@ pub(super) struct ErrorArgs {
     /// Aperture jitter: each sample is taken this much off its instant, rms, as 2ps or 0.01samples [default:
     /// 0]
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = quantity::time)]
-    jitter: Option<Time>,
+    jitter: Option<WrittenTime>,
     /// By how many parts per million the clocks are too fast, one value for all or one per channel
     #[arg(long, value_name = "PPM,..", value_delimiter = ',', allow_hyphen_values = true)]
     drift: Vec<f64>,
     /// True delays minus those of the spec, as 10ps or 0.01samples, one value for all or one per channel
     #[arg(long, value_name = "TIME,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::time)]
-    delay_error: Vec<Time>,
+    delay_error: Vec<WrittenTime>,
     /// Relative errors of the gains, as 1% or 0.01, one value for all or one per channel
     #[arg(long, value_name = "SHARE,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
     gain_error: Vec<f64>,
@@ -43,8 +43,8 @@ pub(super) struct ErrorArgs {
 }
 
 impl ErrorArgs {
-    pub(super) fn errors(&self) -> ConverterErrors {
-        ConverterErrors {
+    pub(super) fn errors(&self) -> ErrorLists {
+        ErrorLists {
             noise: self.noise,
             bits: self.bits,
             jitter: self.jitter,
@@ -121,7 +121,7 @@ pub(super) fn integers(bits: Option<u32>) -> Option<PcmFormat> {
 
 impl CommonReport {
     /// Of the converters of a spec.
-    pub(super) fn new(errors: &ConverterErrors, spec: &Spec) -> Self {
+    pub(super) fn new(errors: &ErrorLists, spec: &Spec) -> Self {
         let jitter = errors.jitter.map_or(Seconds(0.0), |jitter| jitter.in_seconds(spec.fast_period));
         Self { noise: errors.noise, bits: errors.bits, jitter: jitter.0, seed: errors.seed }
     }

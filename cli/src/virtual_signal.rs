@@ -1,10 +1,10 @@
 //! The analog signal that `simulate` is asked for.
 
-use super::capture_file::{CaptureFile, Reading};
+use super::capture_file::{CaptureFile, ReadingRules};
 use super::print::Failure;
 use hybank::design::Problem;
 use hybank::messages::Quoted;
-use hybank::simulate::{self, Analog, ComplexSource, MOST_SAMPLES, Recording, Source};
+use hybank::simulate::{self, Analog, ComplexSource, MOST_SAMPLES, Periodic, Source};
 use hybank::spec::Spec;
 use hybank::units::FastPeriods;
 use std::path::Path;
@@ -31,7 +31,7 @@ impl SignalArgs {
 }
 
 /// An analog signal in normalised time.
-pub(super) struct Signal {
+pub(super) struct DescribedSignal {
     pub(super) analog: simulate::Signal,
     /// As it was understood.
     pub(super) text: String,
@@ -39,10 +39,10 @@ pub(super) struct Signal {
     pub(super) given: String,
 }
 
-impl Signal {
+impl DescribedSignal {
     /// From --source and --imaginary.
     pub(super) fn read(args: &SignalArgs, spec: &Spec) -> Result<Self, Failure> {
-        let reader = Reader { args, spec };
+        let reader = SignalReader { args, spec };
         reader.check_channel()?;
         let (mut analog, text) = reader.source()?;
         let Some(part) = &args.imaginary else {
@@ -83,12 +83,12 @@ impl Signal {
     }
 }
 
-struct Reader<'a> {
+struct SignalReader<'a> {
     args: &'a SignalArgs,
     spec: &'a Spec,
 }
 
-impl Reader<'_> {
+impl SignalReader<'_> {
     /// Refuses --channel where there is no recording.
     fn check_channel(&self) -> Result<(), Failure> {
         let given = [Some(&self.args.source), self.args.imaginary.as_ref()];
@@ -125,12 +125,12 @@ impl Reader<'_> {
 
     fn recording(&self, text: &str) -> Result<Analog, Failure> {
         let path = Path::new(text);
-        let reading = Reading::channel(self.args.channel.map(usize::from), MOST_SAMPLES);
+        let reading = ReadingRules::channel(self.args.channel.map(usize::from), MOST_SAMPLES);
         let recording = CaptureFile::read(path, reading)?;
         let (rate, samples) = (recording.rate, recording.finite(path)?);
         // In normalised time the recording's own rate is the fast rate.
         let fast = if self.spec.is_normalised() { rate } else { self.spec.fast_period.rate() };
-        Ok(Analog::Recorded(Recording::new(&samples, FastPeriods(fast / rate))))
+        Ok(Analog::Recorded(Periodic::new(&samples, FastPeriods(fast / rate))))
     }
 }
 

@@ -4,9 +4,9 @@
 //! to 1e-11: the same bits as `1e-11`.
 //!
 //! ```
-//! use hybank_core::quantity::{self, Time};
+//! use hybank_core::quantity::{self, WrittenTime};
 //! use hybank_core::units::Seconds;
-//! assert_eq!(quantity::time("10ps"), Ok(Time::Seconds(Seconds(1e-11))));
+//! assert_eq!(quantity::time("10ps"), Ok(WrittenTime::Seconds(Seconds(1e-11))));
 //! assert_eq!(quantity::time("0.25 samples").map(|time| time.in_seconds(Seconds(4e-9))), Ok(Seconds(1e-9)));
 //! assert_eq!(quantity::relative("0.5%"), Ok(0.005));
 //! ```
@@ -21,14 +21,14 @@ pub(crate) use document::{Rate, Share};
 
 /// A time as it is written: in seconds, or in units of the fast period.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Time {
+pub enum WrittenTime {
     /// In seconds: `10ps`, `1e-11`.
     Seconds(Seconds),
     /// In fast samples: `0.01 samples`.
     Samples(FastPeriods),
 }
 
-impl Time {
+impl WrittenTime {
     /// The time in seconds, with the fast period h.
     pub fn in_seconds(self, fast_period: Seconds) -> Seconds {
         match self {
@@ -172,12 +172,12 @@ const SHARES: &str = "a share such as 1%, 540ppm or 0.01";
 ///
 /// # Errors
 /// [`QuantityError`]. Any finite time is legal, negative ones too.
-pub fn time(text: &str) -> Result<Time, QuantityError> {
+pub fn time(text: &str) -> Result<WrittenTime, QuantityError> {
     let written = Written::split(text, TIMES)?;
     if matches!(written.unit, "samples" | "sample") {
-        return written.scaled(0).map(|value| Time::Samples(FastPeriods(value)));
+        return written.scaled(0).map(|value| WrittenTime::Samples(FastPeriods(value)));
     }
-    written.with_prefix("s", TIMES).map(|value| Time::Seconds(Seconds(value)))
+    written.with_prefix("s", TIMES).map(|value| WrittenTime::Seconds(Seconds(value)))
 }
 
 /// A frequency: hertz with an SI prefix. A number without unit is in hertz.

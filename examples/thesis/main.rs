@@ -13,7 +13,7 @@ mod page;
 mod signals;
 
 use hybank::bank::Bank;
-use hybank::design::Options;
+use hybank::design::DesignOptions;
 use hybank::plot::Chart;
 use hybank::spec::{Method, Spec};
 use page::Page;
@@ -51,7 +51,7 @@ impl Banks {
             let mut spec = spec()?;
             spec.design.method = method;
             spec.design.taps = spec.design.taps.filter(|_| method.has_taps());
-            Ok(hybank::design::design(&spec, &Options::without_proof())?.bank)
+            Ok(hybank::design::design(&spec, &DesignOptions::without_proof())?.bank)
         };
         Ok(Self {
             iir: bank(Method::Iir)?,

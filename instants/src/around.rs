@@ -1,6 +1,6 @@
 //! The samples of all recordings around some instants.
 
-use super::estimator::Sample;
+use super::estimator::TimedSample;
 use super::recording::Recording;
 use hybank_core::units::FastPeriods;
 use std::ops::Range;
@@ -8,7 +8,7 @@ use std::ops::Range;
 /// Samples of all recordings, one recording after another.
 pub(super) struct Around {
     /// With instants relative to the first of those that they lie around.
-    pub(super) samples: Vec<Sample>,
+    pub(super) samples: Vec<TimedSample>,
     /// What they are.
     pub(super) values: Vec<f64>,
     /// Where those of each recording are among them.
@@ -29,7 +29,7 @@ impl Around {
             let begin = samples.len();
             for number in recording.around(instants.clone(), reach, within) {
                 let sample = recording.sample(number as i64);
-                samples.push(Sample { instant: sample.instant - instants.start, ..sample });
+                samples.push(TimedSample { instant: sample.instant - instants.start, ..sample });
                 values.push(recording.samples()[number]);
             }
             places.push(begin..samples.len());

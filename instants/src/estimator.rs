@@ -6,7 +6,7 @@ use hybank_linalg::{LinalgError, Mat, PositiveFactor};
 
 /// A sample of a set.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
+pub struct TimedSample {
     /// Its converter.
     pub converter: usize,
     /// Its true instant, relative to any origin that all instants of a call share.
@@ -37,7 +37,7 @@ impl MeanSquare {
 
 /// Taps for a set of samples.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Taps {
+pub struct EstimatorTaps {
     /// Weights of the samples (rows) for each instant (columns).
     pub weights: Mat,
     /// The error at each instant.
@@ -48,16 +48,16 @@ pub struct Taps {
 ///
 /// ```
 /// use hybank_core::units::{CyclesPerFastPeriod, FastPeriods};
-/// use hybank_instants::{Converter, Estimator, Sample, Signals, Spectrum};
+/// use hybank_instants::{Converter, Estimator, TimedSample, Signals, Spectrum};
 /// use hybank_linalg::Complex;
 /// // Two converters of half the rate, band up to 0.375 cycles per fast period, no front ends.
 /// let band = CyclesPerFastPeriod(0.0)..CyclesPerFastPeriod(0.375);
 /// let spectrum = Spectrum::flat(band, FastPeriods(64.0));
 /// let converters = vec![Converter::exact(0, 1.0, 1e-8), Converter::exact(0, -0.5, 1e-8)];
 /// let signals = Signals::new(&spectrum, &[&|_| Complex::from(1.0)], 0, converters);
-/// let at = |converter, instant| Sample { converter, instant: FastPeriods(instant) };
+/// let at = |converter, instant| TimedSample { converter, instant: FastPeriods(instant) };
 /// let pair = |n: i32| [at(0, 2.0 * f64::from(n)), at(1, 2.0 * f64::from(n) + 0.8)];
-/// let samples: Vec<Sample> = (-15..15).flat_map(pair).collect();
+/// let samples: Vec<TimedSample> = (-15..15).flat_map(pair).collect();
 /// let taps = Estimator::new(signals).taps(&samples, &[FastPeriods(1.0)])?;
 /// assert!(taps.errors[0].total() < 1e-7);
 /// # Ok::<(), hybank_linalg::LinalgError>(())
@@ -80,7 +80,7 @@ impl Estimator {
 
     /// The covariances of some samples among one another. All instants of a call lie within
     /// [`Signals::longest`] of one another.
-    pub fn set<'a>(&'a self, samples: &'a [Sample]) -> SampleSet<'a> {
+    pub fn set<'a>(&'a self, samples: &'a [TimedSample]) -> SampleSet<'a> {
         let mut among = self.signal_covariances(samples);
         for (k, sample) in samples.iter().enumerate() {
             among[(k, k)] += self.signals.noise_of(sample.converter);
@@ -89,7 +89,7 @@ impl Estimator {
     }
 
     /// The covariances of some samples among one another without noise, the lower triangle.
-    pub(super) fn signal_covariances(&self, samples: &[Sample]) -> Mat {
+    pub(super) fn signal_covariances(&self, samples: &[TimedSample]) -> Mat {
         let mut among = Mat::zeros(samples.len(), samples.len());
         for (l, second) in samples.iter().enumerate() {
             for (k, first) in samples.iter().enumerate().skip(l) {
@@ -104,7 +104,11 @@ impl Estimator {
     ///
     /// # Errors
     /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
-    pub fn taps(&self, samples: &[Sample], instants: &[FastPeriods]) -> Result<Taps, LinalgError> {
+    pub fn taps(
+        &self,
+        samples: &[TimedSample],
+        instants: &[FastPeriods],
+    ) -> Result<EstimatorTaps, LinalgError> {
         let set = self.set(samples);
         let with_target = set.with_target(instants);
         set.taps(&with_target)
@@ -115,7 +119,7 @@ impl Estimator {
 #[derive(Debug)]
 pub struct SampleSet<'a> {
     signals: &'a Signals,
-    samples: &'a [Sample],
+    samples: &'a [TimedSample],
     /// C, its lower triangle.
     among: Mat,
 }
@@ -124,7 +128,7 @@ impl SampleSet<'_> {
     /// r, one column for each instant.
     pub fn with_target(&self, instants: &[FastPeriods]) -> Mat {
         Mat::from_fn(self.samples.len(), instants.len(), |k, column| {
-            let Sample { converter, instant } = self.samples[k];
+            let TimedSample { converter, instant } = self.samples[k];
             self.signals.of_target(converter, (instant - instants[column]).0)
         })
     }
@@ -141,12 +145,12 @@ impl SampleSet<'_> {
     ///
     /// # Errors
     /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
-    pub fn taps(&self, with_target: &Mat) -> Result<Taps, LinalgError> {
+    pub fn taps(&self, with_target: &Mat) -> Result<EstimatorTaps, LinalgError> {
         // Nothing is known without samples, and 0 is the best estimate.
         let weights =
             if self.samples.is_empty() { with_target.clone() } else { self.factor()?.solve(with_target) };
         let errors = self.best_errors(&weights, with_target);
-        Ok(Taps { weights, errors })
+        Ok(EstimatorTaps { weights, errors })
     }
 
     /// The errors `1 - r' g / P_0` of the best taps g.
@@ -170,7 +174,7 @@ impl SampleSet<'_> {
     }
 
     fn parted(&self, weights: &Mat, k: usize, total: f64) -> MeanSquare {
-        let noise = |(tap, sample): (&f64, &Sample)| tap * tap * self.signals.noise_of(sample.converter);
+        let noise = |(tap, sample): (&f64, &TimedSample)| tap * tap * self.signals.noise_of(sample.converter);
         let noise: f64 = weights.column(k).iter().zip(self.samples).map(noise).sum();
         let noise = noise / self.signals.target_power();
         MeanSquare { signal: (total - noise).max(0.0), noise }

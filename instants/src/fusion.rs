@@ -54,12 +54,12 @@ pub struct Fused {
 
 /// The outputs, in frames of as many as a recorder has fast periods in each of its own.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Grid {
+pub(super) struct OutputGrid {
     first: FastPeriods,
     pub(super) ratio: usize,
 }
 
-impl Grid {
+impl OutputGrid {
     /// The instant of the first output of a frame.
     pub(super) fn frame(self, frame: usize) -> FastPeriods {
         self.first + FastPeriods((frame * self.ratio) as f64)
@@ -101,8 +101,8 @@ pub fn fuse(
     let FusionSettings { first, count, reach } = settings;
     let longest = estimator.signals().longest();
     let common = common_ratio(recordings).filter(|ratio| ((2 * reach + 2) * ratio) as f64 <= longest.0);
-    let grid = Grid { first, ratio: common.unwrap_or(1) };
-    let fusion = Fusion { estimator, recordings, grid, reach };
+    let grid = OutputGrid { first, ratio: common.unwrap_or(1) };
+    let fusion = KnownInstantFusion { estimator, recordings, grid, reach };
     let frames = count.div_ceil(grid.ratio);
     let length = FRAMES_PER_BLOCK * common.map_or(1, |ratio| blocks_of_stretch(recordings, ratio));
     let stretch = |number: usize| {
@@ -123,14 +123,14 @@ pub fn fuse(
 }
 
 /// What all stretches of a run share.
-struct Fusion<'a> {
+struct KnownInstantFusion<'a> {
     estimator: &'a Estimator,
     recordings: &'a [Recording],
-    grid: Grid,
+    grid: OutputGrid,
     reach: usize,
 }
 
-impl Fusion<'_> {
+impl KnownInstantFusion<'_> {
     /// Whether the samples around these frames come at nearly the common rate.
     fn is_even(&self, recording: &Recording, frames: &Range<usize>) -> bool {
         let clock = recording.clock();

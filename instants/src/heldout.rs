@@ -1,7 +1,7 @@
 //! How well samples are predicted from those around them: a trial of a model by the recordings themselves.
 
 use super::around::Around;
-use super::estimator::{Estimator, Sample};
+use super::estimator::{Estimator, TimedSample};
 use super::recording::Recording;
 use hybank_core::units::FastPeriods;
 use hybank_linalg::{LinalgError, Mat, PositiveFactor, dot};
@@ -26,12 +26,12 @@ pub struct HeldOut {
 /// that predict it. Their covariances are computed once, for whatever noise.
 #[derive(Debug, Clone)]
 pub struct Trials {
-    trials: Vec<Trial>,
+    trials: Vec<HeldOutSamples>,
 }
 
 #[derive(Debug, Clone)]
-struct Trial {
-    samples: Vec<Sample>,
+struct HeldOutSamples {
+    samples: Vec<TimedSample>,
     values: Vec<f64>,
     /// Those that are left out.
     nearest: Vec<usize>,
@@ -51,7 +51,8 @@ impl Trials {
         power: f64,
         instants: &[FastPeriods],
     ) -> Self {
-        let trial = |instant: &FastPeriods| Trial::new(estimator, recordings, reach, power, *instant);
+        let trial =
+            |instant: &FastPeriods| HeldOutSamples::new(estimator, recordings, reach, power, *instant);
         Self { trials: instants.par_iter().map(trial).collect() }
     }
 
@@ -70,7 +71,7 @@ impl Trials {
     }
 }
 
-impl Trial {
+impl HeldOutSamples {
     fn new(
         estimator: &Estimator,
         recordings: &[Recording],
@@ -82,7 +83,7 @@ impl Trial {
         let around = Around::new(recordings, origin..origin, reach, within);
         let (nearest, Around { samples, values, .. }) = (around.nearest(), around);
         // Sounds come and go, noise stays.
-        let gain = |sample: &Sample| estimator.signals().converters()[sample.converter].gain;
+        let gain = |sample: &TimedSample| estimator.signals().converters()[sample.converter].gain;
         let squares = samples.iter().zip(&values).map(|(sample, value)| (value / gain(sample)).powi(2));
         let level = squares.sum::<f64>() / (values.len().max(1) as f64 * power);
         let signal = estimator.signal_covariances(&samples);

@@ -7,8 +7,8 @@
 //! a ten thousandth of a period, which no look at the middle would find.
 
 use super::demand::Outputs;
-use super::estimator::{Estimator, MeanSquare, Sample, Taps};
-use super::fusion::Grid;
+use super::estimator::{Estimator, EstimatorTaps, MeanSquare, TimedSample};
+use super::fusion::OutputGrid;
 use super::recording::Recording;
 use hybank_core::units::FastPeriods;
 use hybank_linalg::{LinalgError, Mat, dot};
@@ -24,7 +24,7 @@ const STANDSTILL: f64 = 1e-9;
 pub(super) struct Stretch<'a> {
     estimator: &'a Estimator,
     recordings: &'a [Recording],
-    grid: Grid,
+    grid: OutputGrid,
     /// Samples of each recording on either side.
     reach: usize,
     /// The first of the samples of each recording for frame 0; it need not be there.
@@ -37,7 +37,7 @@ pub(super) struct Stretch<'a> {
 #[derive(Clone)]
 struct Knot {
     frame: usize,
-    taps: Taps,
+    taps: EstimatorTaps,
 }
 
 impl<'a> Stretch<'a> {
@@ -48,7 +48,7 @@ impl<'a> Stretch<'a> {
     pub(super) fn new(
         estimator: &'a Estimator,
         recordings: &'a [Recording],
-        grid: Grid,
+        grid: OutputGrid,
         reach: usize,
         frames: Range<usize>,
     ) -> Result<Self, LinalgError> {
@@ -70,12 +70,12 @@ impl<'a> Stretch<'a> {
     }
 
     /// All samples for a frame, with instants relative to it.
-    fn samples(&self, frame: usize) -> Vec<Sample> {
+    fn samples(&self, frame: usize) -> Vec<TimedSample> {
         let origin = self.grid.frame(frame);
         let of = |i: usize| {
             self.numbers(i, frame).map(move |number| {
                 let sample = self.recordings[i].sample(number);
-                Sample { instant: sample.instant - origin, ..sample }
+                TimedSample { instant: sample.instant - origin, ..sample }
             })
         };
         (0..self.recordings.len()).flat_map(of).collect()

@@ -37,7 +37,7 @@ mod signals;
 mod spectrum;
 mod ways;
 pub use clock::{Clock, ClockError};
-pub use estimator::{Estimator, MeanSquare, Sample, SampleSet, Taps};
+pub use estimator::{Estimator, EstimatorTaps, MeanSquare, SampleSet, TimedSample};
 pub use fusion::{Fused, FusionSettings, fuse};
 pub use heldout::{HeldOut, Trials};
 pub use learned::learned;

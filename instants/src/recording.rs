@@ -1,7 +1,7 @@
 //! The samples of one converter with their instants.
 
 use super::clock::Clock;
-use super::estimator::Sample;
+use super::estimator::TimedSample;
 use hybank_core::units::FastPeriods;
 use std::ops::Range;
 
@@ -60,8 +60,8 @@ impl Recording {
     }
 
     /// One of the samples with its instant.
-    pub(super) fn sample(&self, number: i64) -> Sample {
-        Sample { converter: self.converter, instant: self.clock.at(number as f64) }
+    pub(super) fn sample(&self, number: i64) -> TimedSample {
+        TimedSample { converter: self.converter, instant: self.clock.at(number as f64) }
     }
 
     /// The numbers of the samples that are there: those between two instants, and `count` more at either

@@ -31,9 +31,9 @@ fn two_recorders() -> Estimator {
 }
 
 /// Samples -23 to 24 of both, the second ones `delay` later and without the `lost` ones.
-fn of_recorders(delay: f64, lost: std::ops::Range<i32>) -> Vec<Sample> {
+fn of_recorders(delay: f64, lost: std::ops::Range<i32>) -> Vec<TimedSample> {
     let of = |converter: usize, delay: f64| {
-        (-23..=24).map(move |n| Sample { converter, instant: FastPeriods(f64::from(n) + delay) })
+        (-23..=24).map(move |n| TimedSample { converter, instant: FastPeriods(f64::from(n) + delay) })
     };
     let second =
         (-23..=24).zip(of(1, delay)).filter(move |(n, _)| !lost.contains(n)).map(|(_, sample)| sample);
@@ -41,7 +41,7 @@ fn of_recorders(delay: f64, lost: std::ops::Range<i32>) -> Vec<Sample> {
 }
 
 /// The errors of any taps at 0 and 1/2.
-fn errors_of(estimator: &Estimator, samples: &[Sample], weights: &Mat) -> Vec<MeanSquare> {
+fn errors_of(estimator: &Estimator, samples: &[TimedSample], weights: &Mat) -> Vec<MeanSquare> {
     let set = estimator.set(samples);
     set.errors(weights, &set.with_target(&[FastPeriods(0.0), FastPeriods(0.5)]))
 }
@@ -105,8 +105,8 @@ fn stamps_with_jitter_have_the_golden_error() {
     let estimator = Estimator::new(Signals::new(&spectrum, &[&|_| Complex::from(1.0)], 0, converters));
     let mut random = Random(3);
     let stamps: Vec<f64> = (0..2040).map(|n| f64::from(n) + 0.3 * random.sample()).collect();
-    let set = |first: usize, instants: &[f64]| -> Vec<Sample> {
-        let sample = |k: usize| Sample { converter: 0, instant: FastPeriods(instants[k]) };
+    let set = |first: usize, instants: &[f64]| -> Vec<TimedSample> {
+        let sample = |k: usize| TimedSample { converter: 0, instant: FastPeriods(instants[k]) };
         (first..first + 32).map(sample).collect()
     };
     let even: Vec<f64> = (0..2040).map(f64::from).collect();
@@ -143,12 +143,12 @@ fn sensors_with_clocks_of_their_own_have_the_golden_errors() {
             let t = from + f64::from(n) / fast;
             let nearest = |i: usize| {
                 let first = (t * rates[i]).round() - 12.0;
-                (0..24).map(move |k| Sample {
+                (0..24).map(move |k| TimedSample {
                     converter: i,
                     instant: FastPeriods(((first + f64::from(k)) / rates[i] - t) * fast),
                 })
             };
-            let samples: Vec<Sample> = (0..3).flat_map(nearest).collect();
+            let samples: Vec<TimedSample> = (0..3).flat_map(nearest).collect();
             estimator.taps(&samples, &[FastPeriods(0.0)]).unwrap().errors[0].total() / 40.0
         };
         let found = decibels((0..40).map(error).sum());
@@ -218,7 +218,7 @@ fn a_drift_is_followed_as_predicted() {
     assert!(decibels(error_of(&fused, 100.0, gap)) > 3.0);
     let exact = |n: usize| {
         let at = FastPeriods(100.0 + n as f64);
-        let samples: Vec<(Sample, f64)> = recordings
+        let samples: Vec<(TimedSample, f64)> = recordings
             .iter()
             .flat_map(|recording| {
                 let nearest = recording.nearest(at);
@@ -226,7 +226,7 @@ fn a_drift_is_followed_as_predicted() {
                     .map(move |k| (recording.sample(k), recording.samples()[k as usize]))
             })
             .collect();
-        let (samples, values): (Vec<Sample>, Vec<f64>) = samples.into_iter().unzip();
+        let (samples, values): (Vec<TimedSample>, Vec<f64>) = samples.into_iter().unzip();
         let taps = estimator.taps(&samples, &[at]).unwrap();
         hybank_linalg::dot(taps.weights.as_slice(), &values)
     };

@@ -5,9 +5,9 @@
 //! nothing is allocated in the loop; products and Cholesky factors are faer's kernels.
 //!
 //! ```
-//! use hybank_linalg::blocks::{Blocks, SmallCholesky};
+//! use hybank_linalg::blocks::{Batch, SmallCholesky};
 //! use hybank_linalg::{CMat, Complex};
-//! let mut blocks = Blocks::zeros(2, 1, 1);
+//! let mut blocks = Batch::zeros(2, 1, 1);
 //! blocks.set(0, &CMat::from_element(1, 1, Complex::new(0.0, 3.0)));
 //! let mut square = blocks.clone();
 //! let factor = blocks.block(0);
@@ -29,14 +29,14 @@ type C64 = Complex<f64>;
 
 /// `count` complex matrices of `rows` x `cols`, each column-major, one after the other.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Blocks {
+pub struct Batch {
     rows: usize,
     cols: usize,
     count: usize,
     data: Vec<C64>,
 }
 
-impl Blocks {
+impl Batch {
     /// All entries zero.
     pub fn zeros(count: usize, rows: usize, cols: usize) -> Self {
         Self { rows, cols, count, data: vec![C64::default(); count * rows * cols] }
@@ -58,10 +58,10 @@ impl Blocks {
     }
 
     /// Entries of block `l`, column-major.
-    pub fn block(&self, l: usize) -> Block<'_> {
+    pub fn block(&self, l: usize) -> BatchView<'_> {
         let size = self.rows * self.cols;
         let data = &self.data[l * size..(l + 1) * size];
-        Block { rows: self.rows, cols: self.cols, stride: self.rows, data }
+        BatchView { rows: self.rows, cols: self.cols, stride: self.rows, data }
     }
 
     /// Entries of block `l`, column-major, to be written.
@@ -106,7 +106,7 @@ pub fn inner(a: &[C64], b: &[C64]) -> f64 {
 
 /// One block or a rectangle of it, to be read.
 #[derive(Debug, Clone, Copy)]
-pub struct Block<'a> {
+pub struct BatchView<'a> {
     /// Number of rows.
     pub rows: usize,
     /// Number of columns.
@@ -117,16 +117,16 @@ pub struct Block<'a> {
     pub data: &'a [C64],
 }
 
-impl<'a> Block<'a> {
+impl<'a> BatchView<'a> {
     /// Entry in row `i`, column `j`.
     pub fn at(&self, i: usize, j: usize) -> C64 {
         self.data[i + j * self.stride]
     }
 
     /// The `rows` x `cols` rectangle whose first entry is in row `i`, column `j`.
-    pub fn part(self, i: usize, j: usize, rows: usize, cols: usize) -> Block<'a> {
+    pub fn part(self, i: usize, j: usize, rows: usize, cols: usize) -> BatchView<'a> {
         let data = if rows * cols == 0 { &[] } else { &self.data[i + j * self.stride..] };
-        Block { rows, cols, stride: self.stride, data }
+        BatchView { rows, cols, stride: self.stride, data }
     }
 
     /// The block itself as a factor.
@@ -171,7 +171,7 @@ impl BlockMut<'_> {
     }
 
     /// `self = l^{-1} self` with the lower triangle of `l`.
-    pub fn solve_lower(&mut self, l: Block<'_>) {
+    pub fn solve_lower(&mut self, l: BatchView<'_>) {
         solve_lower_triangular_in_place(l.view(), self.view(), Par::Seq);
     }
 

@@ -1,6 +1,6 @@
 //! `hybank.align`.
 
-use crate::arrays::{Held, Shape};
+use crate::arrays::{ArrayShape, Held};
 use crate::background;
 use crate::calibrate::reference_of;
 use crate::errors::{refused, warn};
@@ -39,7 +39,7 @@ pub(crate) fn align<'py>(
 }
 
 fn record_of(x: &Bound<'_, PyAny>) -> PyResult<Record> {
-    let captures = Held::new(x, Shape::MONO)?.captures()?;
+    let captures = Held::new(x, ArrayShape::MONO)?.captures()?;
     Ok(captures.channels.first().map_or_else(|| Record::new(Vec::new()), |channel| channel.record(None)))
 }
 

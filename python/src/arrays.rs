@@ -1,11 +1,11 @@
 //! Arrays as inputs of a bank, without a copy.
 
 use crate::errors::{capture_error, refused, warn};
-use crate::formats::Format;
+use crate::formats::ArrayFormat;
 use hybank::bank::FrameLayout;
 use hybank::captures::Captures;
 use hybank::io::{DecodedFrames, Decoder, StatedScale, StreamHeader};
-use hybank::runtime::{Input, PcmFrames, SampleLayout, SideBySide};
+use hybank::runtime::{FrameSource, PcmFrames, SampleLayout, SideBySide};
 use numpy::ndarray::Axis;
 use numpy::{
     Element, PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
@@ -16,7 +16,7 @@ use pyo3::types::{PyDict, PyList, PySlice, PyTuple};
 
 /// What an array of samples must look like.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Shape {
+pub(crate) struct ArrayShape {
     /// The axis of time, as NumPy counts: 0 or -2, 1 or -1.
     pub(crate) axis: isize,
     /// N.
@@ -27,7 +27,7 @@ pub(crate) struct Shape {
 
 /// How samples lie in memory.
 #[derive(Debug, Clone, Copy)]
-struct Layout {
+struct ArrayLayout {
     channels: usize,
     frames: usize,
     order: Order,
@@ -46,22 +46,22 @@ enum Order {
 pub(crate) struct Held<'py> {
     /// Along the axis that varies fastest.
     bytes: PyReadonlyArrayDyn<'py, u8>,
-    layout: Layout,
+    layout: ArrayLayout,
     scale: StatedScale,
-    pub(crate) format: Format,
+    pub(crate) format: ArrayFormat,
 }
 
 /// Samples as they lie in an array, or as numbers where their full scale is another.
 pub(crate) enum Samples<'a> {
-    Stored(Vec<PcmFrames<'a>>, Format),
+    Stored(Vec<PcmFrames<'a>>, ArrayFormat),
     Decoded(Vec<DecodedFrames>),
 }
 
 impl Samples<'_> {
     /// The samples, or the real and the imaginary parts of complex ones.
-    pub(crate) fn parts(&self) -> Vec<Box<dyn Input + '_>> {
+    pub(crate) fn parts(&self) -> Vec<Box<dyn FrameSource + '_>> {
         match self {
-            Self::Stored(frames, Format { complex: false, .. }) => {
+            Self::Stored(frames, ArrayFormat { complex: false, .. }) => {
                 vec![Box::new(SideBySide::new(&frames[..]))]
             }
             Self::Stored(frames, _) => {
@@ -72,7 +72,7 @@ impl Samples<'_> {
                 let real = all.iter().map(|one| one.frames().real).collect::<Vec<_>>();
                 let imaginary: Vec<_> = all.iter().filter_map(|one| one.frames().imaginary).collect();
                 let parts = [real, imaginary].into_iter().filter(|part| !part.is_empty());
-                parts.map(|part| Box::new(SideBySide::new(part)) as Box<dyn Input>).collect()
+                parts.map(|part| Box::new(SideBySide::new(part)) as Box<dyn FrameSource>).collect()
             }
         }
     }
@@ -82,12 +82,12 @@ impl<'py> Held<'py> {
     /// Holds `x`: any array whose samples lie frame after frame or channel after channel is read where it
     /// is, also a slice along time of the latter. Others (slices with steps, foreign byte orders,
     /// lists) are copied first.
-    pub(crate) fn new(x: &Bound<'py, PyAny>, shape: Shape) -> PyResult<Self> {
+    pub(crate) fn new(x: &Bound<'py, PyAny>, shape: ArrayShape) -> PyResult<Self> {
         let Ok(array) = x.cast_exact::<PyUntypedArray>() else {
             return Self::new(&plain(x)?, shape);
         };
         let [channels, frames] = shape.of(array)?;
-        let Ok(format) = Format::of_dtype(array.dtype().as_any()) else {
+        let Ok(format) = ArrayFormat::of_dtype(array.dtype().as_any()) else {
             return Self::converted(array, shape);
         };
         let (by_rows, by_columns) = (array.is_c_contiguous(), array.is_fortran_contiguous());
@@ -105,11 +105,11 @@ impl<'py> Held<'py> {
         let rows = if is_turned { x.getattr("T")? } else { x.clone() };
         let bytes = rows.call_method1("view", ("u1",))?;
         let bytes = bytes.cast::<PyArrayDyn<u8>>()?.try_readonly().map_err(refused)?;
-        Ok(Self { bytes, layout: Layout { channels, frames, order }, scale: shape.scale, format })
+        Ok(Self { bytes, layout: ArrayLayout { channels, frames, order }, scale: shape.scale, format })
     }
 
     /// From another byte order.
-    fn converted(array: &Bound<'py, PyUntypedArray>, shape: Shape) -> PyResult<Self> {
+    fn converted(array: &Bound<'py, PyUntypedArray>, shape: ArrayShape) -> PyResult<Self> {
         let dtype = array.getattr("dtype")?;
         if !dtype.getattr("isnative")?.extract::<bool>()? {
             let native = dtype.call_method1("newbyteorder", ("=",))?;
@@ -166,7 +166,9 @@ impl<'py> Held<'py> {
 
     /// The samples as a recorder has them; the parts of complex ones take turns.
     fn recordings(&self) -> PyResult<Vec<PcmFrames<'_>>> {
-        let Self { layout: Layout { channels, order, .. }, format: Format { number, complex }, .. } = *self;
+        let Self {
+            layout: ArrayLayout { channels, order, .. }, format: ArrayFormat { number, complex }, ..
+        } = *self;
         let layout = SampleLayout::packed(number);
         let parts = 1 + usize::from(complex);
         let frames = |bytes, channels| PcmFrames { layout, channels: parts * channels, bytes };
@@ -201,7 +203,7 @@ pub(crate) fn warn_of(py: Python<'_>, decoders: &[Decoder]) -> PyResult<()> {
     })
 }
 
-impl Shape {
+impl ArrayShape {
     /// Of one channel, nothing of whose full scale is stated.
     pub(crate) const MONO: Self =
         Self { axis: -1, channels: 1, scale: StatedScale { given: None, of_spec: None, bits: None } };
@@ -265,8 +267,8 @@ pub(crate) fn framed<'py>(
     layout: &FrameLayout,
     axis: isize,
     is_whole: bool,
-) -> PyResult<(Bound<'py, PyAny>, Shape)> {
-    let shape = Shape { axis, channels: layout.count(), ..Shape::MONO };
+) -> PyResult<(Bound<'py, PyAny>, ArrayShape)> {
+    let shape = ArrayShape { axis, channels: layout.count(), ..ArrayShape::MONO };
     let converters = layout.samples();
     let given: Vec<Bound<'py, PyAny>> = match (x.cast::<PyList>(), x.cast::<PyTuple>()) {
         _ if layout.is_plain() => return Ok((x.clone(), shape)),
@@ -306,7 +308,7 @@ pub(crate) fn framed<'py>(
         rows.push(part.call_method1("reshape", (frames, *samples))?);
     }
     let all = numpy.call_method1("concatenate", (PyList::new(x.py(), rows)?, 1))?;
-    Ok((all, Shape { axis: 0, ..shape }))
+    Ok((all, ArrayShape { axis: 0, ..shape }))
 }
 
 /// The array of a list, of an object of another package, or of a subclass.

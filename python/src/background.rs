@@ -13,7 +13,7 @@ const POLL: Duration = Duration::from_millis(20);
 /// Recursions of the solvers fit the stack of a main thread.
 const STACK_BYTES: usize = 16 << 20;
 
-enum Message<T> {
+enum DesignMessage<T> {
     /// A step begins.
     Stage(Stage),
     Done(T),
@@ -21,7 +21,7 @@ enum Message<T> {
 
 /// What a computation says while it runs.
 pub(crate) struct Reporter<T> {
-    sender: Sender<Message<T>>,
+    sender: Sender<DesignMessage<T>>,
     stop: Stop,
 }
 
@@ -29,7 +29,7 @@ impl<T> Reporter<T> {
     /// Reports that a step begins.
     pub(crate) fn begins(&self, stage: Stage) {
         // The receiver lives as long as somebody waits.
-        let _ = self.sender.send(Message::Stage(stage));
+        let _ = self.sender.send(DesignMessage::Stage(stage));
     }
 
     /// Due when the result is no longer waited for.
@@ -51,13 +51,13 @@ pub(crate) fn run<T: Send + 'static>(
     let thread = thread::Builder::new().name("hybank".into()).stack_size(STACK_BYTES);
     thread.spawn(move || {
         let result = work(&reporter);
-        let _ = reporter.sender.send(Message::Done(result));
+        let _ = reporter.sender.send(DesignMessage::Done(result));
     })?;
     let mut wait = || loop {
         let inbox = &mut messages;
         match py.detach(move || inbox.recv_timeout(POLL)) {
-            Ok(Message::Done(result)) => return Ok(result),
-            Ok(Message::Stage(stage)) => report(progress, stage)?,
+            Ok(DesignMessage::Done(result)) => return Ok(result),
+            Ok(DesignMessage::Stage(stage)) => report(progress, stage)?,
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(refused("the computation ended without a result; this is a fault of hybank"));
@@ -81,18 +81,18 @@ fn report(progress: Option<&Bound<'_, PyAny>>, stage: Stage) -> PyResult<()> {
 const EVERY: Duration = Duration::from_millis(100);
 
 /// Checks for signals now and then, and keeps what a handler raised.
-pub(crate) struct Signals {
-    state: Mutex<State>,
+pub(crate) struct SignalCheck {
+    state: Mutex<SignalState>,
 }
 
-struct State {
+struct SignalState {
     next: Instant,
     raised: Option<PyErr>,
 }
 
-impl Signals {
+impl SignalCheck {
     pub(crate) fn new() -> Self {
-        Self { state: Mutex::new(State { next: Instant::now() + EVERY, raised: None }) }
+        Self { state: Mutex::new(SignalState { next: Instant::now() + EVERY, raised: None }) }
     }
 
     /// Whether the handler of a signal raised. To be called without the interpreter lock.

@@ -4,11 +4,11 @@ use crate::arrays::{framed, matrix, read_only};
 use crate::background;
 use crate::errors::{choose, refused};
 use crate::formats;
-use crate::fuse::{self, Request, parse_algorithm};
+use crate::fuse::{self, FuseRequest, parse_algorithm};
 use crate::hardware::{self, CircuitKeywords};
 use crate::outputs::write_file;
 use crate::pictures;
-use crate::responses::{self, Matrices, Row, Rows};
+use crate::responses::{self, DoubleRows, Doubles, Matrices};
 use crate::results::{FiguresReport, of_report, record};
 use crate::sources;
 use crate::stream::Stream;
@@ -203,19 +203,23 @@ impl Bank {
 
     #[doc = include_str!("docs/Bank.error_response.rst")]
     #[pyo3(signature = (n = 512))]
-    fn error_response<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Row<'py>, Row<'py>)> {
+    fn error_response<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Doubles<'py>, Doubles<'py>)> {
         responses::error_response(py, &self.bank, n)
     }
 
     #[doc = include_str!("docs/Bank.frequency_response.rst")]
     #[pyo3(signature = (n = 512))]
-    fn frequency_response<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Row<'py>, Rows<'py, Complex64>)> {
+    fn frequency_response<'py>(
+        &self,
+        py: Python<'py>,
+        n: i64,
+    ) -> PyResult<(Doubles<'py>, DoubleRows<'py, Complex64>)> {
         responses::frequency_response(py, &self.bank, n)
     }
 
     #[doc = include_str!("docs/Bank.front_end_gains.rst")]
     #[pyo3(signature = (n = 512))]
-    fn front_end_gains<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Row<'py>, Rows<'py>)> {
+    fn front_end_gains<'py>(&self, py: Python<'py>, n: i64) -> PyResult<(Doubles<'py>, DoubleRows<'py>)> {
         responses::front_end_gains(py, &self.bank, n)
     }
 
@@ -298,7 +302,7 @@ impl Bank {
         let bank = &slf.get().bank;
         let (frames, shape) = framed(x, &bank.layout(), axis, false)?;
         let shape = shape.scaled(Converters::from(&**bank).scale(formats::full_scale(full_scale)?));
-        let request = Request {
+        let request = FuseRequest {
             workers: fuse::workers(threads)?,
             gaps: fuse::gaps(py, bank, gaps)?,
             algorithm: parse_algorithm(algorithm)?,

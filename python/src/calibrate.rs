@@ -8,8 +8,8 @@ use crate::results::{Made, record};
 use crate::sources;
 use crate::values::frequencies;
 use hybank::calibrate::{
-    self as calibration, Calibration, CalibrationSignal, ChannelEstimate, Fit, Fitting, Settings, Tone,
-    Warning, applied,
+    self as calibration, Calibration, CalibrationSettings, CalibrationSignal, CalibrationTone,
+    CalibrationWarning, ChannelEstimate, FittedValues, Fitting, applied,
 };
 use hybank::captures::Converters;
 use hybank::sine_fit::Estimate;
@@ -46,7 +46,7 @@ pub(crate) fn calibrate<'py>(
         return Err(refused("clip: give a positive level"));
     }
     let records = held.captures()?.records(clip);
-    let settings = Settings { fit: fitted(&fit)?, reference: reference_of(&spec, reference)? };
+    let settings = CalibrationSettings { fit: fitted(&fit)?, reference: reference_of(&spec, reference)? };
     let nominal = spec.clone();
     let found =
         background::run(py, None, move |_| calibration::calibrate(&spec, &records, &signal, settings))?;
@@ -79,11 +79,11 @@ fn signal(
     }
 }
 
-fn fitted(names: &[String]) -> PyResult<Fit> {
+fn fitted(names: &[String]) -> PyResult<FittedValues> {
     let value = |name: &String| {
         name.parse::<Fitting>().map_err(|error| refused(format!("fit: \"{name}\" is unknown; {error}")))
     };
-    names.iter().try_fold(Fit::NOTHING, |fit, name| Ok(fit.with(value(name)?)))
+    names.iter().try_fold(FittedValues::NOTHING, |fit, name| Ok(fit.with(value(name)?)))
 }
 
 /// From 0.
@@ -97,7 +97,7 @@ pub(crate) fn reference_of(spec: &Spec, given: Option<usize>) -> PyResult<usize>
 
 /// A tone that was used.
 #[derive(serde::Serialize)]
-struct ToneReport {
+struct ToneRecord {
     frequency: Estimate<Hertz>,
     zone: usize,
     amplitude: f64,
@@ -126,16 +126,16 @@ fn result<'py>(py: Python<'py>, spec: &Spec, found: &Calibration) -> PyResult<Bo
         made = made.with(name, column(|found| found.value))?;
         made = made.with(&format!("{name}_sigma"), column(|found| found.sigma))?;
     }
-    let tone = |tone: &Tone| ToneReport {
+    let tone = |tone: &CalibrationTone| ToneRecord {
         frequency: tone.frequency,
         zone: tone.zone,
         amplitude: tone.amplitude.value,
     };
-    let tones: Vec<ToneReport> = found.tones.iter().map(tone).collect();
-    let (notes, warnings): (Vec<&Warning>, _) =
+    let tones: Vec<ToneRecord> = found.tones.iter().map(tone).collect();
+    let (notes, warnings): (Vec<&CalibrationWarning>, _) =
         found.warnings.iter().chain(&more).partition(|warning| warning.is_note());
     warnings.iter().try_for_each(|warning| warn(py, warning))?;
-    let texts = |list: Vec<&Warning>| list.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let texts = |list: Vec<&CalibrationWarning>| list.iter().map(ToString::to_string).collect::<Vec<_>>();
     made.with("spec", calibrated.to_toml().map_err(refused)?)?
         .with("reference", found.reference + 1)?
         .with("tones", record(py, &tones)?)?

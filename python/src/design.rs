@@ -4,7 +4,7 @@ use crate::background;
 use crate::bank::Bank;
 use crate::errors::{refused, spec_error, warn};
 use crate::{sources, values};
-use hybank::design::{Design, DesignError, Options, ProofSearch, TIME_LIMIT, judge_taps, warnings};
+use hybank::design::{Design, DesignError, DesignOptions, ProofSearch, TIME_LIMIT, judge_taps, warnings};
 use hybank::spec::DesignOverrides;
 use pyo3::prelude::*;
 
@@ -30,7 +30,7 @@ pub(crate) fn design(
     let designed = background::run(py, progress, move |reporter| {
         let observer = |stage| reporter.begins(stage);
         let stop = reporter.stop();
-        hybank::design::design(&spec, &Options { proof, time_limit, observer: &observer, stop })
+        hybank::design::design(&spec, &DesignOptions { proof, time_limit, observer: &observer, stop })
     })?;
     finished(py, designed, proof)
 }

@@ -1,6 +1,6 @@
 //! Recordings from files, as `fuse` and `measure` of the command line read them.
 
-use crate::arrays::{Held, Shape};
+use crate::arrays::{Held, ArrayShape};
 use crate::bank::Bank;
 use crate::errors::{capture_error, io_error, refused, warn};
 use crate::formats;
@@ -21,7 +21,7 @@ const MOST: usize = 1 << 32;
 /// How files are read, by the names of the command line.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub(crate) struct Options<'py> {
+pub(crate) struct CaptureOptions<'py> {
     format: String,
     channels: Option<usize>,
     channel: Option<usize>,
@@ -59,7 +59,7 @@ fn in_turn(of: &Converters<'_>, converters: usize) -> PyResult<TimeInterleaving>
 pub(crate) fn read<'py>(
     py: Python<'py>,
     files: Vec<PathBuf>,
-    options: Options<'py>,
+    options: CaptureOptions<'py>,
     source: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     match source {
@@ -73,7 +73,7 @@ pub(crate) fn read<'py>(
 fn read_for<'py>(
     py: Python<'py>,
     files: &[PathBuf],
-    options: &Options,
+    options: &CaptureOptions,
     converters: Option<&Converters<'_>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let turns = options.interleaved.zip(converters);
@@ -110,7 +110,7 @@ fn read_for<'py>(
     Ok(found)
 }
 
-impl Options<'_> {
+impl CaptureOptions<'_> {
     fn format(&self) -> PyResult<FileFormat> {
         Ok(FileFormat {
             coding: self.format.parse().map_err(|error| refused(format!("format: {error}")))?,
@@ -123,7 +123,7 @@ impl Options<'_> {
     }
 }
 
-impl Options<'_> {
+impl CaptureOptions<'_> {
     fn table(&self) -> PyResult<TableOptions> {
         let columns = self.columns.iter().map(|column| parsed("columns", column));
         let time = self.time_column.as_deref().map(|column| parsed("time_column", column)).transpose()?;
@@ -169,7 +169,7 @@ pub(crate) fn numbers<'py>(
 ) -> PyResult<Vec<Vec<f64>>> {
     let given = formats::full_scale(full_scale)?;
     let (scale, channels) = with_converters(source, |all| Ok((all.scale(given), all.layout().count())))?;
-    let captures = Held::new(x, Shape { axis, channels, scale })?.captures()?;
+    let captures = Held::new(x, ArrayShape { axis, channels, scale })?.captures()?;
     if captures.channels.iter().any(|channel| channel.imaginary.is_some()) {
         return Err(refused("complex samples; give the real or the imaginary parts for a page"));
     }

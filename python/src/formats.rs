@@ -8,25 +8,25 @@ use pyo3::prelude::*;
 
 /// A number type of samples in the byte order of this machine, and whether two of them are a complex sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Format {
+pub(crate) struct ArrayFormat {
     pub(crate) number: PcmFormat,
     pub(crate) complex: bool,
 }
 
 /// The formats by the names that NumPy has for them.
-const FORMATS: [(&str, Format); 12] = [
-    ("f4", Format::F32),
-    ("f8", Format::native(PcmFormat::F64Le, false)),
-    ("i1", Format::native(PcmFormat::S8, false)),
-    ("u1", Format::native(PcmFormat::U8, false)),
-    ("i2", Format::native(PcmFormat::S16Le, false)),
-    ("i4", Format::native(PcmFormat::S32Le, false)),
-    ("i8", Format::native(PcmFormat::S64Le, false)),
-    ("u2", Format::native(PcmFormat::U16Le, false)),
-    ("u4", Format::native(PcmFormat::U32Le, false)),
-    ("f2", Format::native(PcmFormat::F16Le, false)),
-    ("c8", Format::native(PcmFormat::F32Le, true)),
-    ("c16", Format::native(PcmFormat::F64Le, true)),
+const FORMATS: [(&str, ArrayFormat); 12] = [
+    ("f4", ArrayFormat::F32),
+    ("f8", ArrayFormat::native(PcmFormat::F64Le, false)),
+    ("i1", ArrayFormat::native(PcmFormat::S8, false)),
+    ("u1", ArrayFormat::native(PcmFormat::U8, false)),
+    ("i2", ArrayFormat::native(PcmFormat::S16Le, false)),
+    ("i4", ArrayFormat::native(PcmFormat::S32Le, false)),
+    ("i8", ArrayFormat::native(PcmFormat::S64Le, false)),
+    ("u2", ArrayFormat::native(PcmFormat::U16Le, false)),
+    ("u4", ArrayFormat::native(PcmFormat::U32Le, false)),
+    ("f2", ArrayFormat::native(PcmFormat::F16Le, false)),
+    ("c8", ArrayFormat::native(PcmFormat::F32Le, true)),
+    ("c16", ArrayFormat::native(PcmFormat::F64Le, true)),
 ];
 
 /// The full scale of converters that `full_scale=` means: a number, or codes such as "12bits".
@@ -36,7 +36,7 @@ pub(crate) fn full_scale(given: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Fu
     scale.map(Some).map_err(|error| refused(format!("full_scale: {error}")))
 }
 
-impl Format {
+impl ArrayFormat {
     /// Real samples in f32.
     pub(crate) const F32: Self = Self::native(PcmFormat::F32Le, false);
 

@@ -1,9 +1,9 @@
 //! Fuses arrays.
 
-use crate::arrays::{Held, Shape, warn_of};
-use crate::background::{self, Signals};
+use crate::arrays::{ArrayShape, Held, warn_of};
+use crate::background::{self, SignalCheck};
 use crate::errors::{capture_error, refused, warn};
-use crate::formats::Format;
+use crate::formats::ArrayFormat;
 use crate::outputs::NewArray;
 use crate::results::Made;
 use hybank::bank::Bank;
@@ -11,7 +11,7 @@ use hybank::calibrate::{Agreement, Record, Verdict, agreement, comparable, frame
 use hybank::design::MissingSamples;
 use hybank::io::{DecodedFrames, OfflineSamples};
 use hybank::pipeline::{self, DroppedLatency, Gap, GapEstimator, GapSummary, Outcome, Settings, Warning};
-use hybank::runtime::{Algorithm, Frames, Input, Options, Plan, Precision, ThreadPool};
+use hybank::runtime::{Algorithm, FrameSource, Frames, Options, Plan, Precision, ThreadPool};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use std::sync::Arc;
@@ -21,7 +21,7 @@ use std::time::Instant;
 const MOST_THREADS: i64 = 1024;
 
 /// How an array is to be fused.
-pub(crate) struct Request {
+pub(crate) struct FuseRequest {
     pub(crate) workers: Option<ThreadPool>,
     pub(crate) gaps: Option<Arc<dyn GapEstimator>>,
     pub(crate) algorithm: Algorithm,
@@ -30,7 +30,7 @@ pub(crate) struct Request {
     pub(crate) is_reported: bool,
 }
 
-impl Request {
+impl FuseRequest {
     fn settings(&self) -> Settings<'_> {
         let dropped = if self.keep_latency { DroppedLatency::Added } else { DroppedLatency::All };
         Settings { dropped, gaps: self.gaps.clone(), workers: self.workers.as_ref() }
@@ -64,7 +64,7 @@ pub(crate) fn parse_algorithm(name: &str) -> PyResult<Algorithm> {
 }
 
 /// The bank made ready for outputs of a format.
-pub(crate) fn plan(bank: &Bank, format: Format, algorithm: Algorithm) -> PyResult<Plan> {
+pub(crate) fn plan(bank: &Bank, format: ArrayFormat, algorithm: Algorithm) -> PyResult<Plan> {
     let options = Options { precision: Precision::of(format.number), algorithm, ..Options::default() };
     bank.plan(options).map_err(refused)
 }
@@ -85,7 +85,7 @@ fn judged(bank: &Bank, held: &Held<'_>) -> PyResult<Agreement> {
 }
 
 /// Output samples, and how they came about.
-pub(crate) struct Fused<'py> {
+pub(crate) struct FusedArray<'py> {
     pub(crate) y: Bound<'py, PyAny>,
     outcome: Outcome,
     captures: Agreement,
@@ -99,13 +99,13 @@ pub(crate) struct Fused<'py> {
 pub(crate) fn fuse<'py>(
     bank: &Bank,
     x: &Bound<'py, PyAny>,
-    shape: Shape,
+    shape: ArrayShape,
     dtype: Option<&Bound<'py, PyAny>>,
-    request: &Request,
-) -> PyResult<Fused<'py>> {
+    request: &FuseRequest,
+) -> PyResult<FusedArray<'py>> {
     let (py, begin) = (x.py(), Instant::now());
     let held = Held::new(x, shape)?;
-    let format = Format::of_output(held.format, dtype)?;
+    let format = ArrayFormat::of_output(held.format, dtype)?;
     let mut fused = filtered(bank, &held, format, request)?;
     fused.seconds = begin.elapsed().as_secs_f64();
     if request.is_reported {
@@ -115,7 +115,12 @@ pub(crate) fn fuse<'py>(
     Ok(fused)
 }
 
-fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Request) -> PyResult<Fused<'py>> {
+fn filtered<'py>(
+    bank: &Bank,
+    held: &Held<'py>,
+    format: ArrayFormat,
+    request: &FuseRequest,
+) -> PyResult<FusedArray<'py>> {
     let (py, settings, frames) = (held.py(), request.settings(), held.frames());
     let asked = request.algorithm;
     let algorithm = if settings.gaps.is_some() { asked.without_added_latency() } else { asked };
@@ -127,12 +132,12 @@ fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Reques
     warn_of(py, &decoders)?;
     let (parts, mut room) = (samples.parts(), array.room()?);
     let parts: Vec<_> = parts.iter().map(|part| Frames::new(&**part, 0..frames)).collect();
-    let parts: Vec<&dyn Input> = parts.iter().map(|part| part as _).collect();
-    let signals = Signals::new();
+    let parts: Vec<&dyn FrameSource> = parts.iter().map(|part| part as _).collect();
+    let signals = SignalCheck::new();
     let stop = || signals.raised();
     let outcome = py.detach(|| pipeline::fuse(bank, &plan, &parts, &mut room, settings, &stop));
     let outcome = outcome.map_err(|error| signals.into_error().unwrap_or_else(|| refused(error)))?;
-    Ok(Fused {
+    Ok(FusedArray {
         // A frame may hold several samples of a converter.
         outcome: Outcome { clipped: room.clipped, channels: bank.channel_count(), ..outcome },
         peak: room.peak(frames * bank.ratio * parts.len()),
@@ -144,7 +149,7 @@ fn filtered<'py>(bank: &Bank, held: &Held<'py>, format: Format, request: &Reques
     })
 }
 
-impl Fused<'_> {
+impl FusedArray<'_> {
     /// What was tolerated.
     fn warnings(&self) -> Vec<String> {
         let text = |warning| match warning {

@@ -1,6 +1,6 @@
 //! A bank of integer taps for hardware: the exported circuit, and the model of its bits.
 
-use crate::arrays::{Held, Shape};
+use crate::arrays::{ArrayShape, Held};
 use crate::errors::{file_error, refused, warn};
 use crate::outputs::begin_file;
 use hybank::bank::Bank;
@@ -87,7 +87,7 @@ fn at_least_one(keyword: &str, given: Option<u32>) -> PyResult<NonZeroU32> {
 pub(crate) fn fuse<'py>(
     bank: &Bank,
     x: &Bound<'py, PyAny>,
-    shape: Shape,
+    shape: ArrayShape,
     accumulator: u32,
     keep_latency: bool,
 ) -> PyResult<Bound<'py, PyAny>> {

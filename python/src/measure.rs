@@ -1,6 +1,6 @@
 //! `hybank.measure`.
 
-use crate::arrays::{Held, Shape};
+use crate::arrays::{ArrayShape, Held};
 use crate::background;
 use crate::errors::{choose, refused, warn};
 use crate::formats;
@@ -8,14 +8,14 @@ use crate::results::{Made, record};
 use crate::values::frequencies;
 use hybank::captures::ChannelSamples;
 use hybank::io::StatedScale;
-use hybank::measure::{self as quality, Measurement, Settings, Warning, Window};
+use hybank::measure::{self as quality, MeasureWarning, Measurement, Settings, Window};
 use hybank::overview::{Figure, causes, column};
 use hybank::units::{Decibels, Hertz};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 
 /// How a record is measured.
-struct Request {
+struct MeasureRequest {
     rate: Hertz,
     window: Window,
     /// Samples at either end that are not measured.
@@ -23,7 +23,7 @@ struct Request {
     scale: StatedScale,
 }
 
-impl Request {
+impl MeasureRequest {
     fn new(rate: f64, window: &str, skip: usize, full_scale: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         if !(rate > 0.0 && rate.is_finite()) {
             return Err(refused(format!("rate: {rate} is no sample rate; give samples per second")));
@@ -34,7 +34,7 @@ impl Request {
 
     /// The only channel of an array, without its ends.
     fn channel(&self, y: &Bound<'_, PyAny>) -> PyResult<ChannelSamples> {
-        let captures = Held::new(y, Shape::MONO.scaled(self.scale))?.captures()?;
+        let captures = Held::new(y, ArrayShape::MONO.scaled(self.scale))?.captures()?;
         let channel = captures.channels.into_iter().next().unwrap_or_default();
         channel.trimmed(self.skip).map_err(|error| refused(format!("skip: {error}")))
     }
@@ -53,7 +53,7 @@ pub(crate) fn measure(
     window: &str,
     skip: usize,
 ) -> PyResult<Py<PyAny>> {
-    let request = Request::new(rate, window, skip, full_scale)?;
+    let request = MeasureRequest::new(rate, window, skip, full_scale)?;
     let settings = Settings {
         tones: frequencies("tones", tones)?.into_iter().map(Hertz).collect(),
         converters: interleaved,
@@ -76,8 +76,8 @@ pub(crate) fn compare(
     window: &str,
     skip: usize,
     full_scale: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(Py<PyAny>, Spectrum)> {
-    let (py, request) = (y.py(), Request::new(rate, window, skip, full_scale)?);
+) -> PyResult<(Py<PyAny>, SpectrumArrays)> {
+    let (py, request) = (y.py(), MeasureRequest::new(rate, window, skip, full_scale)?);
     let part = |x: &Bound<'_, PyAny>| -> PyResult<Vec<f64>> {
         let channel = request.channel(x)?;
         if channel.imaginary.is_some() {
@@ -88,16 +88,16 @@ pub(crate) fn compare(
         Ok(channel.samples)
     };
     let (own, other) = (part(y)?, part(reference)?);
-    let Request { rate, window, .. } = request;
+    let MeasureRequest { rate, window, .. } = request;
     let found = background::run(py, None, move |_| quality::compare(&own, &other, rate, window))?;
     let found = found.map_err(refused)?;
     Ok((record(py, &found)?, spectrum(py, &found.error_spectrum, 1.0)))
 }
 
 /// Hertz, and levels in dB.
-type Spectrum = (Py<PyArray1<f64>>, Py<PyArray1<f64>>);
+type SpectrumArrays = (Py<PyArray1<f64>>, Py<PyArray1<f64>>);
 
-fn spectrum(py: Python<'_>, of: &quality::Spectrum, full_scale: f64) -> Spectrum {
+fn spectrum(py: Python<'_>, of: &quality::RecordSpectrum, full_scale: f64) -> SpectrumArrays {
     let hertz = (0..of.amplitudes.len()).map(|bin| of.frequency(bin).0);
     let levels = of.amplitudes.iter().map(|amplitude| Decibels::of_amplitude(amplitude / full_scale).0);
     (PyArray1::from_iter(py, hertz).unbind(), PyArray1::from_iter(py, levels).unbind())
@@ -109,13 +109,13 @@ const WINDOWS: [(&str, Window); 4] =
 
 /// As the report of the command line. Figures may be infinite, which JSON cannot say.
 fn result(py: Python<'_>, found: &Measurement) -> PyResult<Py<PyAny>> {
-    let text = |warning: Warning| match &warning {
-        Warning::Unsettled(ends) => format!("{warning}; skip={} leaves them out", ends.samples),
+    let text = |warning: MeasureWarning| match &warning {
+        MeasureWarning::Unsettled(ends) => format!("{warning}; skip={} leaves them out", ends.samples),
         _ => warning.to_string(),
     };
     let warnings: Vec<String> = found.warnings().into_iter().map(text).collect();
     warnings.iter().try_for_each(|text| warn(py, text))?;
-    let spurs: Vec<_> = found.spurs.iter().map(|spur| Spur { spur, cause: causes(spur) }).collect();
+    let spurs: Vec<_> = found.spurs.iter().map(|spur| NamedSpur { spur, cause: causes(spur) }).collect();
     let figure = |of: Figure| (of.name, of.value, of.unit, of.meaning);
     let made = Made::of(py, "Measurement", found)?
         .with("sinad_db", found.sinad.0)?
@@ -136,7 +136,7 @@ fn result(py: Python<'_>, found: &Measurement) -> PyResult<Py<PyAny>> {
 
 /// A spur with its causes as a text.
 #[derive(serde::Serialize)]
-struct Spur<'a> {
+struct NamedSpur<'a> {
     #[serde(flatten)]
     spur: &'a quality::Spur,
     cause: String,

@@ -1,10 +1,10 @@
 //! New arrays and files for outputs.
 
-use crate::arrays::{Held, Shape};
+use crate::arrays::{ArrayShape, Held};
 use crate::errors::{file_error, refused};
-use crate::formats::Format;
+use crate::formats::ArrayFormat;
 use hybank::files::AtomicFile;
-use hybank::runtime::{Input, Isa, Output, PcmOutput, Sample};
+use hybank::runtime::{FrameSink, FrameSource, Isa, PcmOutput, Sample};
 use numpy::{PyArray1, PyArrayMethods, PyReadwriteArray1};
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
@@ -19,12 +19,12 @@ const SURE: usize = 1 << 18;
 pub(crate) struct NewArray<'py> {
     /// Of one axis, in the byte order of this machine.
     bytes: PyReadwriteArray1<'py, u8>,
-    format: Format,
+    format: ArrayFormat,
 }
 
 impl<'py> NewArray<'py> {
     /// Zeros.
-    pub(crate) fn new(py: Python<'py>, samples: usize, format: Format) -> PyResult<Self> {
+    pub(crate) fn new(py: Python<'py>, samples: usize, format: ArrayFormat) -> PyResult<Self> {
         Ok(Self { bytes: zeros(py, samples.saturating_mul(format.bytes()))?, format })
     }
 
@@ -56,11 +56,11 @@ pub(crate) fn encode<'py>(
     y: &Bound<'py, PyAny>,
     dtype: &Bound<'py, PyAny>,
 ) -> PyResult<(Bound<'py, PyAny>, u64)> {
-    let held = Held::new(y, Shape::MONO)?;
-    let mut array = NewArray::new(y.py(), held.frames(), Format::of_dtype(dtype)?)?;
+    let held = Held::new(y, ArrayShape::MONO)?;
+    let mut array = NewArray::new(y.py(), held.frames(), ArrayFormat::of_dtype(dtype)?)?;
     let samples = held.samples(&mut held.decoders()?)?;
     let (parts, mut room) = (samples.parts(), array.room()?);
-    let (frames, is_single) = (held.frames(), held.format == Format::F32);
+    let (frames, is_single) = (held.frames(), held.format == ArrayFormat::F32);
     let clipped = y.py().detach(|| {
         if is_single {
             convert::<f32>(&*parts[0], frames, &mut room);
@@ -72,7 +72,7 @@ pub(crate) fn encode<'py>(
     Ok((array.finish()?, clipped))
 }
 
-fn convert<T: Sample>(samples: &dyn Input, frames: usize, room: &mut dyn Output) {
+fn convert<T: Sample>(samples: &dyn FrameSource, frames: usize, room: &mut dyn FrameSink) {
     let mut numbers = vec![T::default(); frames];
     samples.load(Isa::detect(), 0, &mut numbers);
     room.store(Isa::detect(), 0, &numbers);

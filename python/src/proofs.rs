@@ -25,14 +25,18 @@ pub(crate) fn verify<'py>(bank: &Bound<'py, PyAny>, search: bool) -> PyResult<Bo
     let verified = background::run(bank.py(), None, move |_| proven(&bank_in, search))?;
     let verified = verified.map_err(|error| refused_in(&given.name, error))?;
     let bank_in = &given.bank;
-    let report =
-        Report { verified, digest: given.digest, certificate_in_file, worst_case: bank_in.gamma.worst_case };
+    let report = ProvenBounds {
+        verified,
+        digest: given.digest,
+        certificate_in_file,
+        worst_case: bank_in.gamma.worst_case,
+    };
     of_report(bank.py(), "Verified", &report)
 }
 
 /// Proven bounds, and where the proof is from.
 #[derive(serde::Serialize)]
-struct Report {
+struct ProvenBounds {
     #[serde(flatten)]
     verified: checker::Verified,
     digest: Option<bool>,

@@ -1,7 +1,7 @@
 //! `hybank.Recording`: frames of a WAV or SigMF file from any place, for workers that read spans of it.
 
 use crate::errors::{io_error, no_others};
-use crate::formats::Format;
+use crate::formats::ArrayFormat;
 use hybank::io::FrameFile;
 use hybank::runtime::{Precision, Sample};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -50,7 +50,7 @@ impl Recording {
     #[getter]
     fn dtype(&self) -> &'static str {
         let header = self.file.header();
-        Format::floats(header.layout.format, header.is_complex).name()
+        ArrayFormat::floats(header.layout.format, header.is_complex).name()
     }
 
     #[doc = include_str!("docs/Recording.read.rst")]

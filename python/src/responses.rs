@@ -3,7 +3,7 @@
 use crate::arrays::matrix;
 use crate::background;
 use crate::errors::refused;
-use hybank::bank::{Bank, StateSpace, SynthesisFilters};
+use hybank::bank::{Bank, StateMatrices, SynthesisFilters};
 use hybank::design;
 use hybank::design::responses::{fir_response, impulse_responses};
 use hybank::units::Hertz;
@@ -18,20 +18,20 @@ const MOST_DENSE_STATES: usize = 4096;
 const MOST_FREQUENCIES: usize = 10_000_000;
 
 /// A one-dimensional array of doubles.
-pub(crate) type Row<'py> = Bound<'py, PyArray1<f64>>;
+pub(crate) type Doubles<'py> = Bound<'py, PyArray1<f64>>;
 
 /// A two-dimensional array.
-pub(crate) type Rows<'py, T = f64> = Bound<'py, PyArray2<T>>;
+pub(crate) type DoubleRows<'py, T = f64> = Bound<'py, PyArray2<T>>;
 
 /// `a`, `b`, `c` and `d`.
-pub(crate) type Matrices<'py> = (Rows<'py>, Rows<'py>, Rows<'py>, Rows<'py>);
+pub(crate) type Matrices<'py> = (DoubleRows<'py>, DoubleRows<'py>, DoubleRows<'py>, DoubleRows<'py>);
 
 /// The error at `n` frequencies: these in hertz, and its gains.
 pub(crate) fn error_response<'py>(
     py: Python<'py>,
     bank: &Arc<Bank>,
     n: i64,
-) -> PyResult<(Row<'py>, Row<'py>)> {
+) -> PyResult<(Doubles<'py>, Doubles<'py>)> {
     let (count, bank) = (frequency_count(n)?, Arc::clone(bank));
     let points = background::run(py, None, move |_| design::error_response(&bank, count))?;
     let points = points.map_err(refused)?;
@@ -44,7 +44,7 @@ pub(crate) fn frequency_response<'py>(
     py: Python<'py>,
     bank: &Arc<Bank>,
     n: i64,
-) -> PyResult<(Row<'py>, Rows<'py, Complex64>)> {
+) -> PyResult<(Doubles<'py>, DoubleRows<'py, Complex64>)> {
     let (frequencies, bank) = (frequencies(bank, n)?, Arc::clone(bank));
     let of = frequencies.clone();
     let rows = background::run(py, None, move |_| {
@@ -57,7 +57,11 @@ pub(crate) fn frequency_response<'py>(
 }
 
 /// The gains of the target and of each channel at `n` frequencies, a row for each.
-pub(crate) fn front_end_gains<'py>(py: Python<'py>, bank: &Bank, n: i64) -> PyResult<(Row<'py>, Rows<'py>)> {
+pub(crate) fn front_end_gains<'py>(
+    py: Python<'py>,
+    bank: &Bank,
+    n: i64,
+) -> PyResult<(Doubles<'py>, DoubleRows<'py>)> {
     let frequencies = frequencies(bank, n)?;
     let gains = design::responses::front_end_gains(bank, &frequencies).map_err(refused)?;
     let count = 1 + bank.channel_count();
@@ -78,7 +82,7 @@ pub(crate) fn state_space<'py>(py: Python<'py>, bank: &Bank) -> PyResult<Matrice
         )));
     }
     let filters = design::filters::lifted(&bank.filters, bank.ratio);
-    let StateSpace { a, b, c, d } = design::filters::to_block(&filters);
+    let StateMatrices { a, b, c, d } = design::filters::to_block(&filters);
     let (states, channels) = (a.len(), bank.frame_samples());
     Ok((matrix(py, a, states)?, matrix(py, b, channels)?, matrix(py, c, states)?, matrix(py, d, channels)?))
 }

@@ -1,11 +1,11 @@
 //! The run of a stream, through the pipeline of the command line.
 
 use crate::errors::refused;
-use crate::formats::Format;
+use crate::formats::ArrayFormat;
 use hybank::bank::Bank;
 use hybank::io::IoError;
 use hybank::pipeline::{Block, DroppedLatency, GapEstimator, Pipeline, Settings};
-use hybank::runtime::{Input, Plan};
+use hybank::runtime::{FrameSource, Plan};
 use pyo3::prelude::*;
 use std::io::Write;
 use std::sync::Arc;
@@ -20,18 +20,27 @@ pub(crate) struct Running {
 
 impl Running {
     /// A run of `bank` at its beginning.
-    pub(crate) fn new(bank: &Bank, plan: &Plan, format: Format, gaps: Option<Arc<dyn GapEstimator>>) -> Self {
+    pub(crate) fn new(
+        bank: &Bank,
+        plan: &Plan,
+        format: ArrayFormat,
+        gaps: Option<Arc<dyn GapEstimator>>,
+    ) -> Self {
         let settings = Settings { dropped: DroppedLatency::Nothing, gaps, ..Settings::default() };
         let pipeline = Pipeline::new(bank, plan, settings, format.number, format.complex);
         Self { pipeline, mask: Vec::new(), is_closed: false }
     }
 
     /// Filters frames into `room`, which has their size; returns how many samples came out.
-    pub(crate) fn push(&mut self, parts: &[Box<dyn Input + '_>], mut room: &mut [u8]) -> PyResult<usize> {
+    pub(crate) fn push(
+        &mut self,
+        parts: &[Box<dyn FrameSource + '_>],
+        mut room: &mut [u8],
+    ) -> PyResult<usize> {
         self.begin()?;
         let Self { pipeline, mask, .. } = self;
         let before = pipeline.samples();
-        let parts: Vec<&dyn Input> = parts.iter().map(|part| &**part).collect();
+        let parts: Vec<&dyn FrameSource> = parts.iter().map(|part| &**part).collect();
         pipeline.push_parts(&parts, &mut |block| keep(block, &mut room, mask)).map_err(refused)?;
         Ok((pipeline.samples() - before) as usize)
     }

@@ -1,6 +1,6 @@
 //! `hybank.simulate`.
 
-use crate::arrays::{Held, Shape};
+use crate::arrays::{ArrayShape, Held};
 use crate::background;
 use crate::errors::refused;
 use crate::results::Made;
@@ -9,7 +9,7 @@ use crate::values::{numbers, shares, times};
 use hybank::captures::ChannelSamples;
 use hybank::design::Problem;
 use hybank::simulate::{
-    Analog, ComplexSource, ConverterErrors, Delivered, Recording, RefusedError, Signal, Source,
+    Analog, ComplexSource, Delivered, ErrorLists, Periodic, RefusedError, Signal, Source,
 };
 use hybank::spec::Spec;
 use hybank::units::{FastPeriods, Hertz};
@@ -41,7 +41,7 @@ pub(crate) fn simulate<'py>(
     if !gain.is_finite() {
         return Err(refused(format!("gain: {gain} is not a finite number")));
     }
-    let errors = ConverterErrors {
+    let errors = ErrorLists {
         noise,
         bits,
         jitter: times("jitter", jitter)?.first().copied(),
@@ -117,10 +117,10 @@ fn part(spec: &Spec, signal: &Bound<'_, PyAny>, rate: Option<f64>) -> PyResult<S
     if !(rate.0 > 0.0 && rate.0.is_finite()) {
         return Err(refused(format!("rate: {} is no sample rate; give samples per second", rate.0)));
     }
-    let held = Held::new(signal, Shape::MONO)?;
+    let held = Held::new(signal, ArrayShape::MONO)?;
     let channel = held.captures()?.channels.into_iter().next().unwrap_or_default();
     let ChannelSamples { samples, imaginary, .. } = channel.finite().map_err(refused)?;
-    let part = |samples: &[f64]| Analog::Recorded(Recording::new(samples, FastPeriods(fast / rate)));
+    let part = |samples: &[f64]| Analog::Recorded(Periodic::new(samples, FastPeriods(fast / rate)));
     Ok(Signal { real: part(&samples), imaginary: imaginary.as_deref().map(part) })
 }
 

@@ -1,9 +1,9 @@
 //! `hybank.Stream`: a causal stream, block by block.
 
-use crate::arrays::{Held, Shape, framed};
+use crate::arrays::{ArrayShape, Held, framed};
 use crate::bank::Bank as PyBank;
 use crate::errors::{no_others, refused};
-use crate::formats::{Format, full_scale};
+use crate::formats::{ArrayFormat, full_scale};
 use crate::fuse::{gap, marks, parse_algorithm, plan};
 use crate::outputs::NewArray;
 use crate::running::Running;
@@ -27,8 +27,8 @@ pub(crate) struct Stream {
     /// As it was asked for.
     asked: String,
     plan: Plan,
-    shape: Shape,
-    format: Format,
+    shape: ArrayShape,
+    format: ArrayFormat,
     gaps: Option<Arc<dyn GapEstimator>>,
     running: Mutex<Running>,
     /// What reads the samples; made by the first of them.
@@ -36,7 +36,7 @@ pub(crate) struct Stream {
 }
 
 /// How a pickle makes a stream: a function and its arguments.
-type Reduced<'py> = (
+type Pickled<'py> = (
     Bound<'py, PyAny>,
     (Bound<'py, PyBank>, isize, &'static str, String, Bound<'py, PyBytes>, bool, Option<String>),
 );
@@ -49,9 +49,9 @@ impl Stream {
         algorithm: &str,
         gaps: Option<Arc<dyn GapEstimator>>,
     ) -> PyResult<Self> {
-        let format = dtype.map_or(Ok(Format::F32), Format::of_dtype)?;
+        let format = dtype.map_or(Ok(ArrayFormat::F32), ArrayFormat::of_dtype)?;
         let scale = Converters::from(bank.as_ref()).scale(None);
-        let shape = Shape { axis, channels: bank.frame_samples(), scale };
+        let shape = ArrayShape { axis, channels: bank.frame_samples(), scale };
         shape.check()?;
         let asked = parse_algorithm(algorithm)?.without_added_latency();
         let plan = plan(bank, format, asked)?;
@@ -227,7 +227,7 @@ impl Stream {
         self.gaps.is_none() && self.read(py, |pipeline| pipeline.agrees(state))
     }
 
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Pickled<'py>> {
         let (py, own) = (slf.py(), slf.get());
         let state = own.state(py)?;
         let closed = py.detach(|| own.lock().is_closed);
@@ -285,7 +285,7 @@ impl Stream {
         }
     }
 
-    fn check_parts(&self, given: Format) -> PyResult<()> {
+    fn check_parts(&self, given: ArrayFormat) -> PyResult<()> {
         match (given.complex, self.format.complex) {
             (true, false) => Err(refused(
                 "the samples are complex, the stream is real; make it with bank.stream(dtype=\"c8\") or \"c16\"",

@@ -3,7 +3,7 @@
 
 use crate::errors::refused;
 use hybank::messages::{Quoted, shown};
-use hybank::quantity::{self, QuantityError, Time};
+use hybank::quantity::{self, QuantityError, WrittenTime};
 use hybank::units::Seconds;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -130,8 +130,8 @@ fn type_name(object: &Bound<'_, PyAny>) -> String {
 }
 
 /// Times in seconds, or texts with a unit; none for None.
-pub(crate) fn times(keyword: &str, given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Time>> {
-    quantities(keyword, given, quantity::time, |seconds| Time::Seconds(Seconds(seconds)))
+pub(crate) fn times(keyword: &str, given: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<WrittenTime>> {
+    quantities(keyword, given, quantity::time, |seconds| WrittenTime::Seconds(Seconds(seconds)))
 }
 
 /// Shares: 0.01, `1%` or `500ppm`.

@@ -6,11 +6,11 @@
 
 #[cfg(feature = "rayon")]
 use crate::adapters::SplitOutput;
-use crate::adapters::{Input, Output};
-use crate::algorithms::{Direct, Facts, Filter, OverlapSave, Recursive};
+use crate::adapters::{FrameSink, FrameSource};
+use crate::algorithms::{AlgorithmFacts, Direct, Filter, OverlapSave, Recursive};
 use crate::sample::Sample;
 use crate::simd::flushing;
-use crate::state::{Count, Numbers};
+use crate::state::{Count, StateNumbers};
 use std::sync::Arc;
 
 /// A filter with its state, in the number type of its sums.
@@ -19,19 +19,19 @@ pub(crate) enum Engine {
     F32(Fir<f32>),
     F64(Fir<f64>),
     /// A recursion feeds its rounding errors back: always in f64.
-    Recursive(Running<Recursive>),
+    Recursive(StatefulFilter<Recursive>),
 }
 
 /// One of the algorithms for FIR filters.
 #[derive(Debug, Clone)]
 pub(crate) enum Fir<T: Sample> {
-    Direct(Running<Direct<T>>),
-    OverlapSave(Running<OverlapSave<T>>),
+    Direct(StatefulFilter<Direct<T>>),
+    OverlapSave(StatefulFilter<OverlapSave<T>>),
 }
 
 /// Coefficients, which streams share, and a state that they made.
 #[derive(Debug)]
-pub(crate) struct Running<F: Filter> {
+pub(crate) struct StatefulFilter<F: Filter> {
     filter: Arc<F>,
     state: F::State,
 }
@@ -51,7 +51,7 @@ macro_rules! each {
 
 impl Engine {
     /// See [`Filter::facts`].
-    pub(crate) fn facts(&self) -> Facts {
+    pub(crate) fn facts(&self) -> AlgorithmFacts {
         each!(self, it => it.filter.facts())
     }
 
@@ -61,7 +61,7 @@ impl Engine {
     }
 
     /// See [`Filter::process`].
-    pub(crate) fn process(&mut self, input: &dyn Input, output: &mut dyn Output) -> u64 {
+    pub(crate) fn process(&mut self, input: &dyn FrameSource, output: &mut dyn FrameSink) -> u64 {
         each!(self, it => flushing(|| it.filter.process(&mut it.state, input, output)))
     }
 
@@ -69,7 +69,7 @@ impl Engine {
     #[cfg(feature = "rayon")]
     pub(crate) fn process_parallel(
         &mut self,
-        input: &dyn Input,
+        input: &dyn FrameSource,
         output: &mut dyn SplitOutput,
         pool: &crate::ThreadPool,
     ) -> u64 {
@@ -103,7 +103,7 @@ impl Engine {
 
     /// The state `place` frames after a multiple of the alignment that [`Engine::save`] gave as `numbers`,
     /// after so many `resets`. Does not allocate.
-    pub(crate) fn resume(&mut self, place: usize, numbers: Numbers<'_>, resets: u64) {
+    pub(crate) fn resume(&mut self, place: usize, numbers: StateNumbers<'_>, resets: u64) {
         each!(self, it => it.filter.resume(&mut it.state, place, numbers));
         if let Self::Recursive(it) = self {
             it.state.resets = resets;
@@ -111,18 +111,18 @@ impl Engine {
     }
 }
 
-fn reset<F: Filter>(running: &mut Running<F>) {
+fn reset<F: Filter>(running: &mut StatefulFilter<F>) {
     F::reset(&mut running.state);
 }
 
-impl<F: Filter> Running<F> {
+impl<F: Filter> StatefulFilter<F> {
     /// At its beginning.
     pub(crate) fn new(filter: F) -> Self {
         Self { state: filter.state(), filter: Arc::new(filter) }
     }
 }
 
-impl<F: Filter> Clone for Running<F> {
+impl<F: Filter> Clone for StatefulFilter<F> {
     fn clone(&self) -> Self {
         Self { filter: Arc::clone(&self.filter), state: self.state.clone() }
     }

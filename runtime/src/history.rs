@@ -2,7 +2,7 @@
 
 use crate::aligned::Aligned;
 use crate::sample::Sample;
-use crate::state::Numbers;
+use crate::state::StateNumbers;
 
 /// The last samples before the next frame, then room for frames to come. Short calls move along in the room;
 /// only when it is used up are the last samples copied to the front.
@@ -84,7 +84,7 @@ impl<T: Sample> History<T> {
     }
 
     /// The history is what [`History::save`] gave as the first of `numbers`, and zeros before that.
-    pub(crate) fn resume(&mut self, frames: usize, numbers: Numbers<'_>) {
+    pub(crate) fn resume(&mut self, frames: usize, numbers: StateNumbers<'_>) {
         let n = self.channels;
         let known =
             |age: usize, channel| if age <= frames { numbers.get((age - 1) * n + channel) } else { 0.0 };

@@ -1,9 +1,10 @@
 #![doc = include_str!("../README.md")]
 //!
-//! Samples need not be interleaved: [`Stream::run`] takes any [`Input`] and gives to any [`Output`], such as
-//! a slice per channel ([`Planar`]) and recordings as they lie in files ([`PcmFrames`], [`PcmOutput`]).
-//! Complex samples (IQ) are two streams through one plan, one for the real parts and one for the imaginary
-//! ones, which [`PcmFrames::part`] and `PcmOutput::part` pick out by a stride.
+//! Samples need not be interleaved: [`Stream::run`] takes any [`FrameSource`] and gives to any
+//! [`FrameSink`], such as a slice per channel ([`Planar`]) and recordings as they lie in files
+//! ([`PcmFrames`], [`PcmOutput`]). Complex samples (IQ) are two streams through one plan, one for the real
+//! parts and one for the imaginary ones, which [`PcmFrames::part`] and `PcmOutput::part` pick out by a
+//! stride.
 //!
 //! ```
 //! use hybank_runtime::{Options, PcmFormat, PcmFrames, PcmOutput, Planar, Plan, SampleLayout, Stream};
@@ -54,10 +55,10 @@ mod stream;
 mod tests;
 
 pub use adapters::{
-    Frames, Halves, Input, Interleaved, Output, PcmOutput, Planar, SideBySide, SplitOutput, Zeros,
+    FrameSink, FrameSource, Frames, Halves, Interleaved, PcmOutput, Planar, SideBySide, SplitOutput, Zeros,
 };
 pub use algorithms::choice::{Algorithm, ParseAlgorithmError, Precision};
-pub use algorithms::recursive::{DelayLines, DelayedInput, StateSpace};
+pub use algorithms::recursive::{DelayLines, DelayedInput, StateMatrices};
 pub use error::{BuildError, ProcessError, StateError};
 #[cfg(feature = "rayon")]
 pub use parallel::ThreadPool;

@@ -6,7 +6,7 @@
 //! up all.
 
 use crate::Sample;
-use crate::adapters::{Frames, Input, Output, SplitOutput};
+use crate::adapters::{FrameSink, FrameSource, Frames, SplitOutput};
 use crate::algorithms::Filter;
 use crate::algorithms::direct::{Direct, DirectState};
 use crate::simd::flushing;
@@ -26,7 +26,7 @@ const CHUNKS_PER_THREAD: usize = 8;
 pub(crate) fn process<T: Sample>(
     filter: &Direct<T>,
     state: &mut DirectState<T>,
-    input: &dyn Input,
+    input: &dyn FrameSource,
     output: &mut dyn SplitOutput,
     pool: &ThreadPool,
 ) -> u64 {
@@ -48,7 +48,7 @@ pub(crate) fn process<T: Sample>(
 /// A call whose chunks are shared out.
 struct Call<'a, T: Sample> {
     filter: &'a Direct<T>,
-    input: &'a dyn Input,
+    input: &'a dyn FrameSource,
     /// Least frames of a chunk.
     chunk: usize,
 }
@@ -83,7 +83,7 @@ impl<T: Sample> Call<'_, T> {
         &self,
         frames: Range<usize>,
         state: Option<&mut DirectState<T>>,
-        output: &mut dyn Output,
+        output: &mut dyn FrameSink,
     ) -> (u64, Option<DirectState<T>>) {
         let chunk = Frames::new(self.input, frames.clone());
         match state {

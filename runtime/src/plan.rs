@@ -2,10 +2,10 @@
 
 use crate::adapters::Offsets;
 use crate::algorithms::choice::{ChosenAlgorithm, check_recursive};
-use crate::algorithms::{Direct, Facts, OverlapSave, Recursive};
-use crate::engine::{Engine, Fir, Running};
+use crate::algorithms::{AlgorithmFacts, Direct, OverlapSave, Recursive};
+use crate::engine::{Engine, Fir, StatefulFilter};
 use crate::state::Digest;
-use crate::{Algorithm, BuildError, Isa, Precision, Sample, Shape, StateSpace};
+use crate::{Algorithm, BuildError, Isa, Precision, Sample, Shape, StateMatrices};
 use std::sync::Arc;
 
 /// How a bank is made ready to run.
@@ -57,7 +57,7 @@ pub struct PlanSummary {
 pub struct Plan {
     /// With a state at its beginning.
     start: Arc<Engine>,
-    facts: Facts,
+    facts: AlgorithmFacts,
     channels: usize,
     ratio: usize,
     latency: usize,
@@ -100,7 +100,7 @@ impl Plan {
     /// [`BuildError`] if N or M is 0, the matrices do not fit together, an entry is not finite, or an
     /// algorithm for FIR filters is asked for.
     pub fn from_state_space(
-        filter: &StateSpace,
+        filter: &StateMatrices,
         shape: Shape,
         latency: usize,
         options: Options,
@@ -109,9 +109,9 @@ impl Plan {
         check_counts(channels, ratio)?;
         check_recursive(options.algorithm)?;
         let isa = options.isa;
-        let start = Engine::Recursive(Running::new(Recursive::new(filter, channels, ratio, isa)?));
+        let start = Engine::Recursive(StatefulFilter::new(Recursive::new(filter, channels, ratio, isa)?));
         let mut plan = Self::new(start, shape, latency, isa);
-        let StateSpace { a, b, c, d } = filter;
+        let StateMatrices { a, b, c, d } = filter;
         [a, b, c, d].into_iter().for_each(|rows| plan.digest.add_lists(rows));
         Ok(plan)
     }
@@ -212,7 +212,7 @@ impl Plan {
 
     /// How the bank runs.
     pub fn summary(&self) -> PlanSummary {
-        let Facts { name, transform, multiply_adds, .. } = self.facts;
+        let AlgorithmFacts { name, transform, multiply_adds, .. } = self.facts;
         PlanSummary {
             algorithm: name,
             numbers: self.start.numbers(),
@@ -228,8 +228,10 @@ impl Plan {
 impl ChosenAlgorithm {
     fn filter<T: Sample>(self, taps: &[Vec<f64>], ratio: usize, isa: Isa) -> Result<Fir<T>, BuildError> {
         Ok(match self {
-            Self::Direct => Fir::Direct(Running::new(Direct::new(taps, ratio, isa)?)),
-            Self::OverlapSave(shape) => Fir::OverlapSave(Running::new(OverlapSave::new(taps, shape, isa)?)),
+            Self::Direct => Fir::Direct(StatefulFilter::new(Direct::new(taps, ratio, isa)?)),
+            Self::OverlapSave(shape) => {
+                Fir::OverlapSave(StatefulFilter::new(OverlapSave::new(taps, shape, isa)?))
+            }
         })
     }
 }

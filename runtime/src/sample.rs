@@ -1,6 +1,6 @@
 //! The two number types that kernels run in, and how many samples a frame has.
 
-use crate::simd::Element;
+use crate::simd::SimdElement;
 
 /// The numbers of samples per frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,7 +13,7 @@ pub struct Shape {
 
 /// f32 or f64: what kernels compute in, and what samples in memory are. No other type can be one.
 #[allow(private_bounds, reason = "the private bound closes the trait")]
-pub trait Sample: Element + PartialOrd {
+pub trait Sample: SimdElement + PartialOrd {
     /// Rounds to the nearest.
     fn from_f64(value: f64) -> Self;
     /// Exact.

@@ -20,7 +20,7 @@ const HEADER: usize = COUNTS + 3;
 
 /// What a state says beside the numbers of the algorithm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Header {
+pub(crate) struct StateHeader {
     /// Frames since the beginning.
     pub(crate) position: u64,
     pub(crate) replaced: u64,
@@ -40,9 +40,9 @@ pub(crate) struct Count {
 
 /// The numbers of a state.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Numbers<'a>(&'a [[u8; 8]]);
+pub(crate) struct StateNumbers<'a>(&'a [[u8; 8]]);
 
-impl Header {
+impl StateHeader {
     /// Appends the header; `alignment` is the plan's.
     pub(crate) fn write(&self, alignment: usize, bytes: &mut Vec<u8>) {
         let [one, two] = self.digest;
@@ -62,7 +62,7 @@ impl Header {
         digest: [u64; 2],
         alignment: usize,
         count: impl FnOnce(usize) -> Count,
-    ) -> Result<(Self, Numbers<'_>), StateError> {
+    ) -> Result<(Self, StateNumbers<'_>), StateError> {
         let (words, rest) = bytes.as_chunks::<8>();
         let (Some((header, numbers)), []) = (words.split_first_chunk::<HEADER>(), rest) else {
             return Err(StateError::NotAState);
@@ -77,7 +77,7 @@ impl Header {
         if place != position % alignment as u64 {
             return Err(StateError::Damaged);
         }
-        let (count, numbers) = (count(place as usize), Numbers(numbers));
+        let (count, numbers) = (count(place as usize), StateNumbers(numbers));
         let fits = numbers.0.len() == count.inputs + count.sums;
         if !fits || !(0..count.inputs).all(|i| numbers.get(i).is_finite()) {
             return Err(StateError::Damaged);
@@ -91,7 +91,7 @@ impl Header {
     }
 }
 
-impl Numbers<'_> {
+impl StateNumbers<'_> {
     /// The number at a place.
     pub(crate) fn get(&self, place: usize) -> f64 {
         f64::from_le_bytes(self.0[place])

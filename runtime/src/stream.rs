@@ -2,9 +2,9 @@
 
 #[cfg(feature = "rayon")]
 use crate::adapters::SplitOutput;
-use crate::adapters::{Input, Interleaved, Output, WithoutOffsets, Zeros};
+use crate::adapters::{FrameSink, FrameSource, Interleaved, WithoutOffsets, Zeros};
 use crate::engine::Engine;
-use crate::state::{Count, Header, Numbers};
+use crate::state::{Count, StateHeader, StateNumbers};
 use crate::{Plan, ProcessError, Sample, StateError};
 
 /// Filters the frames of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0 before the
@@ -69,7 +69,7 @@ impl Stream {
         self.position
     }
 
-    /// Input samples that were NaN or infinite and became 0, since the beginning.
+    /// FrameSource samples that were NaN or infinite and became 0, since the beginning.
     pub fn replaced(&self) -> u64 {
         self.replaced
     }
@@ -99,7 +99,11 @@ impl Stream {
     ///
     /// # Errors
     /// As [`Stream::process`].
-    pub fn run(&mut self, input: &dyn Input, output: &mut dyn Output) -> Result<usize, ProcessError> {
+    pub fn run(
+        &mut self,
+        input: &dyn FrameSource,
+        output: &mut dyn FrameSink,
+    ) -> Result<usize, ProcessError> {
         let frames = self.check(input, output)?;
         self.replaced += match self.plan.offsets() {
             Some(offsets) => self.engine.process(&WithoutOffsets { input, offsets }, output),
@@ -119,7 +123,7 @@ impl Stream {
     #[cfg(feature = "rayon")]
     pub fn run_parallel(
         &mut self,
-        input: &dyn Input,
+        input: &dyn FrameSource,
         output: &mut dyn SplitOutput,
         pool: &crate::ThreadPool,
     ) -> Result<usize, ProcessError> {
@@ -137,7 +141,7 @@ impl Stream {
     ///
     /// # Errors
     /// [`ProcessError::OutputTooShort`]; nothing is processed then.
-    pub fn flush(&mut self, output: &mut dyn Output) -> Result<usize, ProcessError> {
+    pub fn flush(&mut self, output: &mut dyn FrameSink) -> Result<usize, ProcessError> {
         let zeros = Zeros { channels: self.channels(), frames: self.plan.flush_frames() };
         let frames = self.check(&zeros, output)?;
         // Zeros without offsets: what no converter delivered.
@@ -157,13 +161,14 @@ impl Stream {
     /// Bytes of the [state](Stream::state) at this frame. Plans of FIR filters keep their history;
     /// overlap-save keeps a batch too, and a recursion its states.
     pub fn state_bytes(&self) -> usize {
-        Header::bytes(self.count(self.position))
+        StateHeader::bytes(self.count(self.position))
     }
 
     /// Appends the [state](Stream::state) to `bytes`. Allocates only where these have no room for it.
     pub fn save(&self, bytes: &mut Vec<u8>) {
         let Self { position, replaced, .. } = *self;
-        let header = Header { position, replaced, resets: self.state_resets(), digest: self.plan.digest() };
+        let header =
+            StateHeader { position, replaced, resets: self.state_resets(), digest: self.plan.digest() };
         header.write(self.plan.alignment(), bytes);
         let mut put = |number: f64| bytes.extend_from_slice(&number.to_le_bytes());
         self.engine.save(&mut put);
@@ -184,9 +189,9 @@ impl Stream {
     }
 
     /// The parts of a state of this plan.
-    fn read<'a>(&self, state: &'a [u8]) -> Result<(Header, Numbers<'a>), StateError> {
+    fn read<'a>(&self, state: &'a [u8]) -> Result<(StateHeader, StateNumbers<'a>), StateError> {
         let count = |place: usize| self.count(place as u64);
-        Header::read(state, self.plan.digest(), self.plan.alignment(), count)
+        StateHeader::read(state, self.plan.digest(), self.plan.alignment(), count)
     }
 
     /// Numbers of the state at a frame.
@@ -195,7 +200,7 @@ impl Stream {
     }
 
     /// The frames of a call, if everything fits.
-    fn check(&self, input: &dyn Input, output: &dyn Output) -> Result<usize, ProcessError> {
+    fn check(&self, input: &dyn FrameSource, output: &dyn FrameSink) -> Result<usize, ProcessError> {
         if input.channels() != self.channels() {
             return Err(ProcessError::Channels { given: input.channels(), wanted: self.channels() });
         }

@@ -35,7 +35,7 @@ pub struct SmoothingSpline {
     samples: Vec<Measured>,
     weights: Vec<f64>,
     /// It is taken off before the fit.
-    line: Line,
+    line: FittedLine,
     /// Distance of knots.
     step: f64,
     walk: f64,
@@ -43,7 +43,7 @@ pub struct SmoothingSpline {
 
 /// The line of least squares.
 #[derive(Debug, Clone, Copy)]
-struct Line {
+struct FittedLine {
     /// At the first sample.
     value: f64,
     slope: f64,
@@ -101,7 +101,7 @@ impl SmoothingSpline {
         Self::fitted(samples, line, step, walk)
     }
 
-    fn fitted(samples: Vec<Measured>, line: Line, step: f64, walk: f64) -> Result<Self, SamplingError> {
+    fn fitted(samples: Vec<Measured>, line: FittedLine, step: f64, walk: f64) -> Result<Self, SamplingError> {
         let first = samples[0].x;
         let end = ((samples[samples.len() - 1].x - first) / step).ceil() as usize;
         let mut fit = Fit::<4, 1>::new(-1, end + 4);
@@ -198,13 +198,13 @@ fn check(samples: &[Measured], walk: f64) -> Result<(), SamplingError> {
     Err(SamplingError::Setting { name, value: walk, rule })
 }
 
-fn line(samples: &[Measured]) -> Line {
+fn line(samples: &[Measured]) -> FittedLine {
     let count = samples.len() as f64;
     let mean = |of: &dyn Fn(&Measured) -> f64| samples.iter().map(of).sum::<f64>() / count;
     let (x, y) = (mean(&|s| s.x), mean(&|s| s.value));
     let (xx, xy) = (mean(&|s| (s.x - x).powi(2)), mean(&|s| (s.x - x) * (s.value - y)));
     let slope = xy / xx;
-    Line { value: y + slope * (samples[0].x - x), slope }
+    FittedLine { value: y + slope * (samples[0].x - x), slope }
 }
 
 /// The least distance of samples at different positions.

@@ -40,7 +40,7 @@ pub(super) struct ClockReading {
 
 /// A place where a recording lacks samples, or has some that the reference has not.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Step {
+pub struct ClockStep {
     /// Samples of the recording, as given, among which it lies: what they hold belongs to neither side.
     pub samples: Range<usize>,
     /// Samples that are lost; below 0 those that are too many.
@@ -57,7 +57,7 @@ pub struct ClockCourse {
     /// The lag over the samples with the steps mended. None for the reference.
     smooth: Option<Smooth>,
     /// By their samples.
-    steps: Vec<Step>,
+    steps: Vec<ClockStep>,
     /// Those that were not refused, by their pieces.
     readings: Vec<ClockReading>,
 }
@@ -70,7 +70,7 @@ impl ClockCourse {
 
     /// Through readings of a recording with these steps. `None` if no spline goes through them, and with
     /// those of fewer than two samples.
-    pub(super) fn new(mut readings: Vec<ClockReading>, steps: Vec<Step>) -> Option<Self> {
+    pub(super) fn new(mut readings: Vec<ClockReading>, steps: Vec<ClockStep>) -> Option<Self> {
         let has_two_samples = readings.iter().any(|reading| reading.sample != readings[0].sample);
         if !has_two_samples {
             return None;
@@ -102,7 +102,7 @@ impl ClockCourse {
     }
 
     /// Where samples were lost or came in.
-    pub fn steps(&self) -> &[Step] {
+    pub fn steps(&self) -> &[ClockStep] {
         &self.steps
     }
 
@@ -176,10 +176,11 @@ impl Smooth {
         let all: Vec<Measured> = readings.iter().map(measured).collect();
         let walks = std::iter::once(0.0).chain(WALKS.map(|exponent| 10f64.powi(exponent)));
         let splines = walks.filter_map(|walk| SmoothingSpline::new(all.clone(), walk).ok());
-        let judged: Vec<(Judged, SmoothingSpline)> =
-            splines.map(|spline| (Judged::new(&spline), spline)).collect();
+        let judged: Vec<(ClockAgreement, SmoothingSpline)> =
+            splines.map(|spline| (ClockAgreement::new(&spline), spline)).collect();
         let least = judged.iter().map(|(judged, _)| judged.surprise).fold(f64::INFINITY, f64::min);
-        let is_good = |(judged, _): &(Judged, SmoothingSpline)| judged.surprise <= least + LIKELY_SURPRISE;
+        let is_good =
+            |(judged, _): &(ClockAgreement, SmoothingSpline)| judged.surprise <= least + LIKELY_SURPRISE;
         let (judged, spline) = judged.into_iter().find(is_good)?;
         let freedom = readings.len().saturating_sub(2).max(1) as f64;
         Some(Self { spline, scale: judged.scale * of_few(freedom).sqrt() })
@@ -187,14 +188,14 @@ impl Smooth {
 }
 
 /// How well each reading is predicted by the others.
-struct Judged {
+struct ClockAgreement {
     /// Root mean square of what readings miss the others by, over the stated deviations.
     scale: f64,
     /// Sum of the negative logarithms of the predictive densities.
     surprise: f64,
 }
 
-impl Judged {
+impl ClockAgreement {
     fn new(spline: &SmoothingSpline) -> Self {
         let all: Vec<LeftOut> = spline.left_out().collect();
         let ratios = || all.iter().map(|out| out.miss / out.deviation);
@@ -285,7 +286,7 @@ mod tests {
 
     #[test]
     fn lost_samples_are_steps_of_the_course() {
-        let steps = vec![Step { samples: 30..32, lost: 7 }, Step { samples: 60..60, lost: -2 }];
+        let steps = vec![ClockStep { samples: 30..32, lost: 7 }, ClockStep { samples: 60..60, lost: -2 }];
         let course = ClockCourse::new(readings(5, 20, 1e-8, |_| 10.0), steps).unwrap();
         let instants = [29.0, 31.0, 32.0, 59.5, 60.0, 61.0].map(|k| course.at(k));
         let want = [19.0, 21.0, 29.0, 56.5, 55.0, 56.0];

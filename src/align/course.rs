@@ -1,9 +1,9 @@
 //! The delays over the time that all recordings have in common, and the spec for them.
 
-use super::clock::{ClockCourse, ClockReading, Step, of_few};
+use super::clock::{ClockCourse, ClockReading, ClockStep, of_few};
 use super::pieces::PieceEstimate;
 use super::{AlignWarning, AlignedChannel, Reading, Stretches};
-use crate::calibrate::{Calibration, ChannelEstimate, Warning, applied};
+use crate::calibrate::{Calibration, CalibrationWarning, ChannelEstimate, applied};
 use crate::sine_fit::Estimate;
 use crate::spec::{HALF_WIDTH, Spec};
 use crate::units::{FastPeriods, Seconds};
@@ -39,7 +39,7 @@ impl<'a> Course<'a> {
     pub(super) fn new(
         spec: &'a Spec,
         reference: usize,
-        steps: &[Vec<Step>],
+        steps: &[Vec<ClockStep>],
         estimates: &[PieceEstimate],
         stretches: &Stretches,
     ) -> Option<Self> {
@@ -113,7 +113,7 @@ impl<'a> Course<'a> {
         Estimate { value: value - self.cut(i, skips), sigma }
     }
 
-    pub(super) fn steps(&self, i: usize) -> &[Step] {
+    pub(super) fn steps(&self, i: usize) -> &[ClockStep] {
         self.clocks[i].steps()
     }
 
@@ -141,7 +141,9 @@ impl<'a> Course<'a> {
             ..Calibration::default()
         };
         let (spec, notes) = applied(self.spec, &calibration);
-        let periods = |note: &Warning| if let Warning::Shifted { periods } = note { *periods } else { 0 };
+        let periods = |note: &CalibrationWarning| {
+            if let CalibrationWarning::Shifted { periods } = note { *periods } else { 0 }
+        };
         let raised = notes.iter().map(periods).sum();
         warnings.extend(notes.into_iter().map(AlignWarning::from));
         let moves = |i: usize| {

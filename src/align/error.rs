@@ -1,7 +1,7 @@
 //! Why recordings cannot be aligned, and what a reader of an alignment must know.
 
-use super::clock::Step;
-use crate::calibrate::{CalibrateError, Warning};
+use super::clock::ClockStep;
+use crate::calibrate::{CalibrateError, CalibrationWarning};
 use crate::units::{FastPeriods, Seconds};
 use std::ops::Range;
 
@@ -117,7 +117,7 @@ pub enum AlignWarning {
         /// From 1.
         channel: usize,
         /// Where, and how many.
-        step: Step,
+        step: ClockStep,
     },
     /// Two channels come to sample at one instant.
     #[error(
@@ -133,7 +133,7 @@ pub enum AlignWarning {
     },
     /// What the values mean.
     #[error(transparent)]
-    Values(#[from] Warning),
+    Values(#[from] CalibrationWarning),
 }
 
 fn numbers(lags: &[i64]) -> String {
@@ -144,7 +144,7 @@ fn because(reason: &Option<CalibrateError>) -> String {
     reason.as_ref().map_or_else(String::new, |reason| format!(": {reason}"))
 }
 
-fn stepped(Step { samples, lost }: &Step) -> String {
+fn stepped(ClockStep { samples, lost }: &ClockStep) -> String {
     let Range { start, end } = samples;
     let place = if start == end {
         format!("at sample {start}")

@@ -10,7 +10,7 @@ const PEAK_SAMPLES: usize = 2;
 
 /// Where a piece of the reference is looked for in another recording.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct SearchWindow {
     /// Its samples in the reference.
     pub(super) first: usize,
     pub(super) length: usize,
@@ -33,8 +33,8 @@ pub(super) struct LocalLag {
 }
 
 impl LocalLag {
-    pub(super) fn new(reference: &Record, other: &Record, place: Place) -> Self {
-        let Place { first, length, expected, margin } = place;
+    pub(super) fn new(reference: &Record, other: &Record, place: SearchWindow) -> Self {
+        let SearchWindow { first, length, expected, margin } = place;
         let size = (length + 2 * margin).next_power_of_two();
         let begin = first as i64 + expected.round() as i64 - margin as i64;
         let mut around = stretch(other, begin, length + 2 * margin);

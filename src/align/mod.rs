@@ -17,12 +17,13 @@ mod steps;
 #[cfg(test)]
 mod tests;
 
-pub use clock::{ClockCourse, Step};
+pub use clock::{ClockCourse, ClockStep};
 pub use error::{AlignError, AlignWarning};
 pub use reading::Reading;
 
 use crate::calibrate::{
-    CalibrationSignal, ChannelEstimate, Fit, Record, Settings, Warning, check, check_parts, line,
+    CalibrationSettings, CalibrationSignal, CalibrationWarning, ChannelEstimate, FittedValues, Record, check,
+    check_parts, line,
 };
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
@@ -30,7 +31,7 @@ use crate::units::Seconds;
 use course::{Course, mean};
 use path::Disagree;
 use pieces::{PieceEstimate, Pieces};
-use steps::{Lags, Placed, mended, spliced};
+use steps::{Lags, Mended, mended, spliced};
 
 /// Least samples that all recordings have in common.
 const LEAST_SAMPLES: usize = 1024;
@@ -128,7 +129,7 @@ pub struct AlignedChannel {
 /// [`AlignError`].
 pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result<Alignment, AlignError> {
     let AlignSettings { reference, within } = settings;
-    let fit = Settings { fit: Fit::default(), reference };
+    let fit = CalibrationSettings { fit: FittedValues::default(), reference };
     check(spec, records, fit)?;
     check_parts(records, &CalibrationSignal::Any)?;
     if !spec.layout().is_plain() {
@@ -140,12 +141,12 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
     enough(records.iter().map(|record| record.samples.len()).min().unwrap_or(0))?;
     let within = within.map_or(f64::INFINITY, |time| time / (spec.fast_period * spec.ratio as f64));
     let placed = |i: usize| match i == reference {
-        true => Ok(Placed { record: records[i].clone(), steps: Vec::new(), lags: Lags::none() }),
+        true => Ok(Mended { record: records[i].clone(), steps: Vec::new(), lags: Lags::none() }),
         false => placed(records, reference, i, within),
     };
     let placed = (0..records.len()).map(placed).collect::<Result<Vec<_>, _>>()?;
     let lags: Vec<Lags> = placed.iter().map(|placed| placed.lags.clone()).collect();
-    let steps: Vec<Vec<Step>> = placed.iter().map(|placed| placed.steps.clone()).collect();
+    let steps: Vec<Vec<ClockStep>> = placed.iter().map(|placed| placed.steps.clone()).collect();
     let whole: Vec<Record> = placed.into_iter().map(|placed| placed.record).collect();
     let stretches = Stretches::new(&whole, reference, &lags)?;
     let pieces = stretches.firsts().len();
@@ -156,7 +157,7 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
 }
 
 /// The recording of channel `i` with its steps mended, and where it lies beside the reference.
-fn placed(records: &[Record], reference: usize, i: usize, within: f64) -> Result<Placed, AlignError> {
+fn placed(records: &[Record], reference: usize, i: usize, within: f64) -> Result<Mended, AlignError> {
     let (own, other) = (&records[reference], &records[i]);
     let (reference, channel) = (reference + 1, i + 1);
     let line = line(own, other, within).map_err(|lags| match lags.is_empty() {
@@ -238,7 +239,7 @@ fn alignment(
     let mut warnings = Vec::new();
     let counts: Vec<usize> = records.iter().map(|record| record.clipped).collect();
     if counts.iter().any(|&count| count > 0) {
-        warnings.push(AlignWarning::Values(Warning::Clipped { counts }));
+        warnings.push(AlignWarning::Values(CalibrationWarning::Clipped { counts }));
     }
     for i in 0..channels.len() {
         let steps = course.steps(i).iter().cloned();

@@ -5,7 +5,7 @@
 //! pieces are on no line, one of them is looked for in a wide stretch of the recording, which gives another
 //! line.
 
-use super::local::{LocalLag, Place};
+use super::local::{LocalLag, SearchWindow};
 use crate::calibrate::{LagLine, Record};
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::ops::Range;
@@ -45,7 +45,7 @@ const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 
 /// A piece whose lag is known.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Known {
+pub(super) struct KnownLag {
     /// Sample of the reference in its middle.
     pub(super) at: f64,
     pub(super) lag: f64,
@@ -53,7 +53,7 @@ pub(super) struct Known {
 
 /// The pieces whose lags are known, and how those grow per sample.
 pub(super) struct Path {
-    pub(super) known: Vec<Known>,
+    pub(super) known: Vec<KnownLag>,
     pub(super) rate: f64,
     /// By how many samples lags of pieces in a row differ at most.
     pub(super) near: f64,
@@ -68,7 +68,7 @@ pub(super) struct Disagree {
 }
 
 /// The pieces of the reference on all lines.
-pub(super) struct Search<'a> {
+pub(super) struct PathSearch<'a> {
     reference: &'a Record,
     other: &'a Record,
     length: usize,
@@ -80,7 +80,7 @@ pub(super) struct Search<'a> {
     lags: Vec<Vec<Option<LocalLag>>>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> PathSearch<'a> {
     /// Of a recording that lies near a line, where samples are whole, and near others parallel to it.
     pub(super) fn new(reference: &'a Record, other: &'a Record, line: LagLine) -> Self {
         let frames = reference.samples.len();
@@ -107,7 +107,7 @@ impl<'a> Search<'a> {
             let (first, length, expected) =
                 (self.firsts[piece], self.length, line.lag_at(self.centre(piece)));
             let is_there = (0.0..last).contains(&(self.centre(piece) + expected));
-            let place = Place { first, length, expected, margin };
+            let place = SearchWindow { first, length, expected, margin };
             is_there.then(|| LocalLag::new(self.reference, self.other, place))
         };
         let lags = (0..self.firsts.len()).map(lag).collect();
@@ -177,9 +177,9 @@ impl<'a> Search<'a> {
         let known = |piece: usize| {
             let (at, lag) =
                 (self.centre(piece), lag(piece).filter(|lag| lag.odds >= ON_LINE_ODDS && lag.is_alone)?);
-            Some((piece, Known { at, lag: self.lines[path[piece]].lag_at(at) + lag.beyond }))
+            Some((piece, KnownLag { at, lag: self.lines[path[piece]].lag_at(at) + lag.beyond }))
         };
-        let found: Vec<(usize, Known)> = there.iter().filter_map(|piece| known(*piece)).collect();
+        let found: Vec<(usize, KnownLag)> = there.iter().filter_map(|piece| known(*piece)).collect();
         let rate = rate(&found.iter().map(|found| found.1).collect::<Vec<_>>());
         let beyond: Vec<f64> = found.iter().map(|(_, known)| known.lag - rate * known.at).collect();
         let moves = beyond.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
@@ -188,7 +188,8 @@ impl<'a> Search<'a> {
             let beside = k.saturating_sub(BESIDE)..(k + BESIDE + 1).min(beyond.len());
             (beyond[k] - median(beyond[beside].to_vec())).abs() <= near
         };
-        let found: Vec<(usize, Known)> = (0..found.len()).filter(|k| agrees(*k)).map(|k| found[k]).collect();
+        let found: Vec<(usize, KnownLag)> =
+            (0..found.len()).filter(|k| agrees(*k)).map(|k| found[k]).collect();
         let level =
             |pieces: &mut dyn Iterator<Item = usize>| pieces.map(|piece| self.levels[piece]).sum::<f64>();
         let agreeing = level(&mut found.iter().map(|found| found.0));
@@ -202,9 +203,9 @@ impl<'a> Search<'a> {
 }
 
 /// The slope that most pairs of pieces some way apart have.
-fn rate(known: &[Known]) -> f64 {
+fn rate(known: &[KnownLag]) -> f64 {
     let apart = (known.len() / PIECES_PER_RATE).clamp(1, RATE_PIECES);
-    let slope = |pair: (&Known, &Known)| (pair.1.lag - pair.0.lag) / (pair.1.at - pair.0.at);
+    let slope = |pair: (&KnownLag, &KnownLag)| (pair.1.lag - pair.0.lag) / (pair.1.at - pair.0.at);
     median(known.iter().zip(known.iter().skip(apart)).map(slope).collect())
 }
 

@@ -7,7 +7,8 @@
 use super::steps::Lags;
 use super::{AlignError, Stretches};
 use crate::calibrate::{
-    CalibrateError, CalibrationSignal, ChannelEstimate, Record, Settings, calibrate, longest_run, steadied,
+    CalibrateError, CalibrationSettings, CalibrationSignal, ChannelEstimate, Record, calibrate, longest_run,
+    steadied,
 };
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
@@ -28,7 +29,7 @@ const FARTHEST: f64 = 1.0;
 pub(super) struct Pieces<'a> {
     records: &'a [Record],
     lags: &'a [Lags],
-    settings: Settings,
+    settings: CalibrationSettings,
     stretches: &'a Stretches,
     /// The expected gains are those of the recordings.
     spec: Spec,
@@ -51,7 +52,7 @@ impl<'a> Pieces<'a> {
         spec: &Spec,
         records: &'a [Record],
         lags: &'a [Lags],
-        settings: Settings,
+        settings: CalibrationSettings,
         stretches: &'a Stretches,
     ) -> Self {
         let mut spec = spec.clone();

@@ -15,7 +15,7 @@ pub struct Reading {
 
 /// A line: absolute delays in seconds with the half-widths of their 95 % intervals.
 #[derive(Serialize)]
-struct Line {
+struct ReadingLine {
     frame: u64,
     delay: Vec<Option<f64>>,
     half_width: Vec<Option<f64>>,
@@ -27,7 +27,7 @@ impl Reading {
         let delay = self.delays.iter().map(|known| known.map(|(delay, _)| delay.0)).collect();
         let half_width =
             self.delays.iter().map(|known| known.map(|(_, sigma)| sigma.0 * HALF_WIDTH)).collect();
-        serde_json::to_string(&Line { frame: self.frame, delay, half_width }).unwrap_or_default()
+        serde_json::to_string(&ReadingLine { frame: self.frame, delay, half_width }).unwrap_or_default()
     }
 }
 

@@ -3,8 +3,8 @@
 //! The lags of a recording are a line with steps of whole samples. Each step is put where the samples before
 //! it fit the reference best at the one lag, and those after it at the other.
 
-use super::clock::Step;
-use super::path::{Disagree, Known, Path, Search, median};
+use super::clock::ClockStep;
+use super::path::{Disagree, KnownLag, Path, PathSearch, median};
 use crate::calibrate::{LagLine, Record, interpolated, stretch};
 use crate::simulate::Instants;
 use crate::units::FastPeriods;
@@ -20,10 +20,10 @@ const SURE: f64 = 1024.0;
 const PLACE_ODDS: f64 = 20.0;
 
 /// A recording whose steps are mended.
-pub(super) struct Placed {
+pub(super) struct Mended {
     /// Lost samples are NaN.
     pub(super) record: Record,
-    pub(super) steps: Vec<Step>,
+    pub(super) steps: Vec<ClockStep>,
     pub(super) lags: Lags,
 }
 
@@ -31,7 +31,7 @@ pub(super) struct Placed {
 #[derive(Debug, Clone)]
 pub(super) struct Lags {
     /// At least two.
-    known: Vec<Known>,
+    known: Vec<KnownLag>,
     /// By how much they grow per sample: the slope of the line of least squares.
     pub(super) rate: f64,
     /// -1 for the opposite polarity.
@@ -42,9 +42,9 @@ impl Lags {
     fn new(path: Path, jumps: &[Jump]) -> Self {
         let lost =
             |at: f64| jumps.iter().filter(|jump| jump.after.at <= at).map(|jump| jump.lost).sum::<i64>();
-        let whole = |known: &Known| Known { lag: known.lag + lost(known.at) as f64, ..*known };
-        let known: Vec<Known> = path.known.iter().map(whole).collect();
-        let mean = |of: fn(&Known) -> f64| known.iter().map(of).sum::<f64>() / known.len() as f64;
+        let whole = |known: &KnownLag| KnownLag { lag: known.lag + lost(known.at) as f64, ..*known };
+        let known: Vec<KnownLag> = path.known.iter().map(whole).collect();
+        let mean = |of: fn(&KnownLag) -> f64| known.iter().map(of).sum::<f64>() / known.len() as f64;
         let (at, lag) = (mean(|known| known.at), mean(|known| known.lag));
         let squares: f64 = known.iter().map(|known| (known.at - at).powi(2)).sum();
         let rate = known.iter().map(|known| (known.at - at) * (known.lag - lag)).sum::<f64>() / squares;
@@ -53,7 +53,7 @@ impl Lags {
 
     /// Of the reference itself.
     pub(super) fn none() -> Self {
-        Self { known: [0.0, 1.0].map(|at| Known { at, lag: 0.0 }).to_vec(), rate: 0.0, sign: 1.0 }
+        Self { known: [0.0, 1.0].map(|at| KnownLag { at, lag: 0.0 }).to_vec(), rate: 0.0, sign: 1.0 }
     }
 
     /// The lag at a sample of the reference: on the line between two pieces, and on that of all beyond them.
@@ -70,16 +70,16 @@ impl Lags {
 
 /// The lags before a step and after it.
 struct Jump {
-    before: Known,
-    after: Known,
+    before: KnownLag,
+    after: KnownLag,
     lost: i64,
 }
 
 /// Finds the steps of a recording that lies near a line.
-pub(super) fn mended(reference: &Record, other: &Record, line: LagLine) -> Result<Placed, Disagree> {
-    let path = Search::new(reference, other, line).known()?;
+pub(super) fn mended(reference: &Record, other: &Record, line: LagLine) -> Result<Mended, Disagree> {
+    let path = PathSearch::new(reference, other, line).known()?;
     let jumps = jumps(&path);
-    let mut steps: Vec<Step> = Vec::new();
+    let mut steps: Vec<ClockStep> = Vec::new();
     for jump in &jumps {
         let begin = steps.last().map_or(0, |step| step.samples.end);
         steps.push(place(reference, other, jump, path.rate, begin));
@@ -90,14 +90,14 @@ pub(super) fn mended(reference: &Record, other: &Record, line: LagLine) -> Resul
         keep: spliced(&other.keep, &steps, false),
         clipped: other.clipped,
     };
-    Ok(Placed { record, steps, lags: Lags::new(path, &jumps) })
+    Ok(Mended { record, steps, lags: Lags::new(path, &jumps) })
 }
 
 /// The samples of a recording without its steps: a filler takes the place of those that are lost, or that
 /// belong to neither side of a step.
-pub(super) fn spliced<T: Copy>(samples: &[T], steps: &[Step], filler: T) -> Vec<T> {
+pub(super) fn spliced<T: Copy>(samples: &[T], steps: &[ClockStep], filler: T) -> Vec<T> {
     let (mut whole, mut begin) = (Vec::with_capacity(samples.len()), 0);
-    for Step { samples: at, lost } in steps {
+    for ClockStep { samples: at, lost } in steps {
         whole.extend_from_slice(&samples[begin..at.start]);
         let missing = at.len() as i64 + lost;
         whole.resize(whole.len() + missing.max(0) as usize, filler);
@@ -118,7 +118,7 @@ fn jumps(path: &Path) -> Vec<Jump> {
     let mut cuts = vec![0];
     cuts.extend((1..known.len()).filter(is_jump));
     cuts.push(known.len());
-    let near = |pieces: &[f64], at: f64| Known { at, lag: median(pieces.to_vec()) + rate * at };
+    let near = |pieces: &[f64], at: f64| KnownLag { at, lag: median(pieces.to_vec()) + rate * at };
     let jump = |cuts: &[usize]| {
         let (left, right) = (&beyond[cuts[0]..cuts[1]], &beyond[cuts[1]..cuts[2]]);
         let before = near(&left[left.len().saturating_sub(BESIDE)..], known[cuts[1] - 1].at);
@@ -131,7 +131,7 @@ fn jumps(path: &Path) -> Vec<Jump> {
 
 /// A jump with its place: from sample `begin` of the recording on, the first sample after those of the one
 /// lag, such that the errors of all samples by their own lags are least.
-fn place(reference: &Record, other: &Record, jump: &Jump, rate: f64, begin: usize) -> Step {
+fn place(reference: &Record, other: &Record, jump: &Jump, rate: f64, begin: usize) -> ClockStep {
     let Jump { before, after, lost } = jump;
     let last = other.samples.len();
     let first = ((before.at + before.lag - SURE).max(0.0) as usize).max(begin).min(last);
@@ -158,7 +158,7 @@ fn place(reference: &Record, other: &Record, jump: &Jump, rate: f64, begin: usiz
     let possible = |cost: &f64| *cost <= least + 2.0 * PLACE_ODDS * variance;
     let from = costs.iter().position(possible).unwrap_or(0);
     let to = costs.iter().rposition(possible).unwrap_or(0);
-    Step { samples: first + from..(first + to + surplus).min(last), lost: *lost }
+    ClockStep { samples: first + from..(first + to + surplus).min(last), lost: *lost }
 }
 
 /// The sum of the errors for each number of samples before a step, after which so many belong to neither

@@ -5,7 +5,7 @@ use crate::calibrate::CalibrateError;
 use crate::calibrate::testbench::gaussian;
 use crate::design::Problem;
 use crate::random::Random;
-use crate::simulate::{Analog, Converter, Recording};
+use crate::simulate::{Analog, Periodic, Sampler};
 use crate::spec::HALF_WIDTH;
 use crate::units::FastPeriods;
 use std::f64::consts::{PI, TAU};
@@ -40,7 +40,7 @@ struct Recorder {
 const PLAIN: Recorder = Recorder { late: 0, delay: 0.0, ppm: 0.0, gain: 1.0, offset: 0.0 };
 
 /// Noise with pauses, up to 2 kHz.
-fn event(samples: usize, dice: &mut Random) -> Recording {
+fn event(samples: usize, dice: &mut Random) -> Periodic {
     let (mut y, mut z) = (0.0, 0.0);
     let loud = |k: usize| if (k / 6000) % 4 == 3 { 0.0 } else { 0.2 };
     let wave: Vec<f64> = (0..samples)
@@ -50,23 +50,23 @@ fn event(samples: usize, dice: &mut Random) -> Recording {
             z
         })
         .collect();
-    Recording::new(&wave, FastPeriods(1.0))
+    Periodic::new(&wave, FastPeriods(1.0))
 }
 
 /// What the recorders deliver of an event, as long as each of `frames` says.
-fn recorded(event: &Recording, recorders: &[Recorder], frames: &[usize], noise: f64) -> Vec<Vec<f64>> {
+fn recorded(event: &Periodic, recorders: &[Recorder], frames: &[usize], noise: f64) -> Vec<Vec<f64>> {
     let spec = Spec { uncertainty: None, ..spec(recorders.len()) };
     let problem = Problem::new(&spec, 16).unwrap();
     let signal = Analog::Recorded(event.clone());
     let of = |(i, (recorder, frames)): (usize, (&Recorder, &usize))| {
-        let converter = Converter {
+        let converter = Sampler {
             delay_error: FastPeriods(recorder.delay),
             gain_error: recorder.gain - 1.0,
             offset: recorder.offset,
             drift: 1e-6 * recorder.ppm,
             noise,
             seed: 7,
-            ..Converter::ideal()
+            ..Sampler::ideal()
         };
         let all = converter.capture(&problem, i, &signal, 1.0, recorder.late + frames);
         all.samples[recorder.late..].to_vec()
@@ -158,7 +158,7 @@ fn lost_and_clipped_samples_are_left_out() {
     recordings[1].iter_mut().step_by(7001).for_each(|x| *x = 1.0);
     let found = aligned(&recordings).unwrap();
     assert_is(&found, &two, 1);
-    let clipped = AlignWarning::Values(Warning::Clipped { counts: vec![0, 9] });
+    let clipped = AlignWarning::Values(CalibrationWarning::Clipped { counts: vec![0, 9] });
     assert!(
         matches!(&found.warnings[..], [first, AlignWarning::FixedTaps { channel: 2, .. }] if *first == clipped)
     );
@@ -229,7 +229,7 @@ fn steps_are_found_reported_and_followed() {
         numbers.extend(begin..whole.len());
         let found = aligned(&[own, other.clone()]).unwrap();
         let clock = found.instants(1);
-        let lost = |step: &Step| step.lost;
+        let lost = |step: &ClockStep| step.lost;
         assert_eq!(
             clock.steps().iter().map(lost).collect::<Vec<_>>(),
             steps.iter().map(|s| s.1).collect::<Vec<_>>()

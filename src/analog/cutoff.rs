@@ -14,18 +14,16 @@
 //! G(x) - G(0) - x G'(0).
 
 use super::AnalogError;
-use super::realise::{Block, Chain};
+use super::realise::{Chain, SeriesBlock};
 use super::roots::Roots;
-use super::section::{Realisation, Section};
-use crate::arithmetic::{Ball, Float512};
+use super::section::{Biquad, Realisation};
+use crate::arithmetic::{Ball, LongBall};
 use crate::spec::FilterSpec;
 use crate::units::Seconds;
 
-type Long = Ball<Float512>;
-
 /// A filter, and the share of its modulus that the terms beyond first order do not exceed.
 pub(crate) struct CutoffRemainder {
-    pub(crate) filter: Realisation<Long>,
+    pub(crate) filter: Realisation<LongBall>,
     pub(crate) share: f64,
 }
 
@@ -36,22 +34,24 @@ impl CutoffRemainder {
     /// # Errors
     /// As [`super::enclosed`].
     pub(crate) fn new(filter: &FilterSpec, h: Seconds, error: f64) -> Result<Option<Self>, AnalogError> {
-        let Chain { gain, blocks } = Chain::<Long>::new(filter, h)?;
+        let Chain { gain, blocks } = Chain::<LongBall>::new(filter, h)?;
         let sections = blocks.into_iter().map(|block| match block {
-            Block::Section(section) => Some(section),
-            Block::State(_) => None,
+            SeriesBlock::Section(section) => Some(section),
+            SeriesBlock::State(_) => None,
         });
-        let Some(sections) = sections.collect::<Option<Vec<Section<Long>>>>() else { return Ok(None) };
+        let Some(sections) = sections.collect::<Option<Vec<Biquad<LongBall>>>>() else {
+            return Ok(None);
+        };
         let share = beyond_first_order(&sections, Ball::from(error));
-        let damped = |section: Section<Long>| Section { zeros: damped(section.zeros), ..section };
-        let blocks = sections.into_iter().map(damped).map(Block::Section).collect();
+        let damped = |section: Biquad<LongBall>| Biquad { zeros: damped(section.zeros), ..section };
+        let blocks = sections.into_iter().map(damped).map(SeriesBlock::Section).collect();
         Ok(share.map(|share| Self { filter: Chain { gain, blocks }.realise(), share }))
     }
 }
 
 /// The zeros moved to -m.
-fn damped(zeros: Roots<Long>) -> Roots<Long> {
-    let real = |z: Long| Ball::from(-z.magnitude());
+fn damped(zeros: Roots<LongBall>) -> Roots<LongBall> {
+    let real = |z: LongBall| Ball::from(-z.magnitude());
     match zeros {
         Roots::None => Roots::None,
         Roots::One(z) => Roots::One(real(z)),
@@ -64,10 +64,10 @@ fn damped(zeros: Roots<Long>) -> Roots<Long> {
 }
 
 /// An upper bound of G(x) - G(0) - x G'(0).
-fn beyond_first_order(sections: &[Section<Long>], x: Long) -> Option<f64> {
+fn beyond_first_order(sections: &[Biquad<LongBall>], x: LongBall) -> Option<f64> {
     let one = Ball::from(1.0);
     let (mut value, mut constant, mut slope) = (one, one, Ball::ZERO);
-    for Section { poles, zeros } in sections {
+    for Biquad { poles, zeros } in sections {
         for c in moduli(*zeros, one, |_, _| Ball::from(2.0).sqrt()) {
             (value, constant, slope) = (value * (c + x), constant * c, slope + one / c);
         }
@@ -83,7 +83,11 @@ fn beyond_first_order(sections: &[Section<Long>], x: Long) -> Option<f64> {
 }
 
 /// `real` for each real root, and what `pair` makes of both roots of a pair.
-fn moduli(roots: Roots<Long>, real: Long, pair: impl Fn(Long, Long) -> Long) -> Vec<Long> {
+fn moduli(
+    roots: Roots<LongBall>,
+    real: LongBall,
+    pair: impl Fn(LongBall, LongBall) -> LongBall,
+) -> Vec<LongBall> {
     match roots {
         Roots::None => Vec::new(),
         Roots::One(_) => vec![real],

@@ -3,7 +3,7 @@
 use crate::arithmetic::Real;
 
 use super::roots::{RootSet, Roots, steps};
-use super::section::Section;
+use super::section::Biquad;
 
 /// Pairs zeros with poles and orders the sections, low quality first, and those of one quality as they were
 /// paired. Needs no more zeros than poles.
@@ -11,19 +11,19 @@ use super::section::Section;
 /// In each step the pair with the least ratio of frequencies is joined. If the zeros of a section were far
 /// from its poles, its gain on one side of the spectrum would be tiny, and no later section could restore
 /// the digits lost to rounding.
-pub(super) fn pair_sections<T: Real>(poles: &RootSet<T>, zeros: &RootSet<T>) -> Vec<Section<T>> {
+pub(super) fn pair_sections<T: Real>(poles: &RootSet<T>, zeros: &RootSet<T>) -> Vec<Biquad<T>> {
     let mut unpaired = UnpairedPoles { real: poles.real.clone(), upper: poles.upper.clone() };
     let mut pairs: Vec<Roots<T>> = zeros.upper.iter().map(|&(re, im)| Roots::Conjugate { re, im }).collect();
     let mut sections = Vec::new();
     while let Some((pair, group)) = closest_pair(&pairs, &unpaired) {
-        sections.push(Section { zeros: pairs.remove(pair), poles: unpaired.take(group) });
+        sections.push(Biquad { zeros: pairs.remove(pair), poles: unpaired.take(group) });
     }
     sections.extend(unpaired.rest());
     let mut real_zeros = zeros.real.clone();
     while let Some((zero, section)) = closest_section(&real_zeros, &sections) {
         attach(&mut sections[section], real_zeros.remove(zero));
     }
-    let rank = |section: &Section<T>| (section.poles.quality().ln() / SAME_QUALITY).round();
+    let rank = |section: &Biquad<T>| (section.poles.quality().ln() / SAME_QUALITY).round();
     sections.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
     sections
 }
@@ -70,10 +70,10 @@ impl<T: Real> UnpairedPoles<T> {
     }
 
     /// Sections without zeros for the remaining poles.
-    fn rest(self) -> impl Iterator<Item = Section<T>> {
+    fn rest(self) -> impl Iterator<Item = Biquad<T>> {
         let conjugate = self.upper.into_iter().map(|(re, im)| Roots::Conjugate { re, im });
         let single = self.real.into_iter().map(Roots::One);
-        conjugate.chain(single).map(|poles| Section { poles, zeros: Roots::None })
+        conjugate.chain(single).map(|poles| Biquad { poles, zeros: Roots::None })
     }
 }
 
@@ -109,7 +109,7 @@ fn closest_pair<T: Real>(pairs: &[Roots<T>], unpaired: &UnpairedPoles<T>) -> Opt
     candidates.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
-fn closest_section<T: Real>(zeros: &[T], sections: &[Section<T>]) -> Option<(usize, usize)> {
+fn closest_section<T: Real>(zeros: &[T], sections: &[Biquad<T>]) -> Option<(usize, usize)> {
     let open = (0..sections.len()).filter(|&k| sections[k].zeros.count() < sections[k].poles.count());
     let candidates = open.flat_map(|k| (0..zeros.len()).map(move |i| (i, k)));
     let cost = |&(i, k): &(usize, usize)| {
@@ -120,7 +120,7 @@ fn closest_section<T: Real>(zeros: &[T], sections: &[Section<T>]) -> Option<(usi
     candidates.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
-fn attach<T: Real>(section: &mut Section<T>, zero: T) {
+fn attach<T: Real>(section: &mut Biquad<T>, zero: T) {
     section.zeros = match section.zeros {
         Roots::One(other) => Roots::Two(other, zero),
         _ => Roots::One(zero),

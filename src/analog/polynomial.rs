@@ -7,12 +7,12 @@
 //! The centres lie symmetric about the real axis, so the root of a real centre is real, and two conjugate
 //! discs hold a conjugate pair.
 
-use crate::arithmetic::{Ball, Cartesian, ComplexBall, Float512, Number};
+use crate::arithmetic::{Ball, Cartesian, ComplexBall, Float, Float512, LongBall};
 use crate::linalg::{self, Complex, Mat};
 
 use super::AnalogError;
 use super::roots::RootSet;
-use super::square_free::{Factor, square_free_factors};
+use super::square_free::{SquareFreeFactor, square_free_factors};
 
 /// Relative error of a coefficient of a square-free factor.
 const COEFFICIENT_ERROR: f64 = 2.0 * Float512::ROUNDING;
@@ -30,7 +30,7 @@ const REAL_ROOT_TOLERANCE: f64 = 1e-100;
 /// rounded to doubles.
 const OUTWARD: f64 = 1.0 + 1e-12;
 
-type Long = Cartesian<Float512>;
+type LongComplex = Cartesian<Float512>;
 
 /// The roots of the polynomial with these coefficients in descending powers, each as often as it occurs;
 /// `what` names it in errors.
@@ -40,11 +40,11 @@ type Long = Cartesian<Float512>;
 pub(super) fn enclosed_roots(
     coefficients: &[f64],
     what: &'static str,
-) -> Result<RootSet<Ball<Float512>>, AnalogError> {
+) -> Result<RootSet<LongBall>, AnalogError> {
     let significant = coefficients.iter().rposition(|&x| x != 0.0).map_or(0, |last| last + 1);
     let mut roots = RootSet::default();
     roots.real.resize(coefficients.len() - significant, Ball::ZERO);
-    for Factor { coefficients, multiplicity } in square_free_factors(&coefficients[..significant]) {
+    for SquareFreeFactor { coefficients, multiplicity } in square_free_factors(&coefficients[..significant]) {
         let simple = isolated(&coefficients).ok_or(AnalogError::RootsNotIsolated { what })?;
         for _ in 0..multiplicity {
             roots.real.extend(&simple.real);
@@ -55,7 +55,7 @@ pub(super) fn enclosed_roots(
 }
 
 /// The simple roots of a polynomial.
-pub(super) fn isolated(p: &[Float512]) -> Option<RootSet<Ball<Float512>>> {
+pub(super) fn isolated(p: &[Float512]) -> Option<RootSet<LongBall>> {
     let centres = symmetric(refined(p, approximate_roots(p)?))?;
     let radii: Vec<f64> = (0..centres.len()).map(|i| radius(p, &centres, i)).collect();
     for (i, &z) in centres.iter().enumerate() {
@@ -80,7 +80,7 @@ pub(super) fn isolated(p: &[Float512]) -> Option<RootSet<Ball<Float512>>> {
 }
 
 /// Eigenvalues of the companion matrix in the unit of their geometric mean, without symmetry.
-fn approximate_roots(p: &[Float512]) -> Option<Vec<Long>> {
+fn approximate_roots(p: &[Float512]) -> Option<Vec<LongComplex>> {
     let n = p.len() - 1;
     let unit = (p[n].exponent() - p[0].exponent()) / (n as i64).max(1);
     let scaled = |k: usize| (p[k] / p[0]).scaled(-unit * k as i64).nearest();
@@ -92,13 +92,13 @@ fn approximate_roots(p: &[Float512]) -> Option<Vec<Long>> {
     let eigenvalues = linalg::eigenvalues(&companion).ok()?;
     let turned = |(i, z): (usize, Complex<f64>)| {
         let z = z * Complex::from_polar(1.0 + ASYMMETRY * i as f64, ASYMMETRY);
-        Long::new(Float512::from(z.re).scaled(unit), Float512::from(z.im).scaled(unit))
+        LongComplex::new(Float512::from(z.re).scaled(unit), Float512::from(z.im).scaled(unit))
     };
     Some(eigenvalues.into_iter().enumerate().map(turned).collect())
 }
 
 /// Newton's steps for all roots at once, each deflated by the other roots (Ehrlich and Aberth).
-fn refined(p: &[Float512], mut roots: Vec<Long>) -> Vec<Long> {
+fn refined(p: &[Float512], mut roots: Vec<LongComplex>) -> Vec<LongComplex> {
     for _ in 0..MAX_STEPS {
         let mut settled = true;
         for i in 0..roots.len() {
@@ -118,7 +118,7 @@ fn refined(p: &[Float512], mut roots: Vec<Long>) -> Vec<Long> {
     roots
 }
 
-fn correction(p: &[Float512], roots: &[Long], i: usize) -> Long {
+fn correction(p: &[Float512], roots: &[LongComplex], i: usize) -> LongComplex {
     let z = roots[i];
     let (mut value, mut slope) = (real(Float512::ZERO), real(Float512::ZERO));
     for &coefficient in p {
@@ -131,31 +131,32 @@ fn correction(p: &[Float512], roots: &[Long], i: usize) -> Long {
     newton / (real(Float512::from(1.0)) - newton * repulsion)
 }
 
-fn real(x: Float512) -> Long {
-    Long::new(x, Float512::ZERO)
+fn real(x: Float512) -> LongComplex {
+    LongComplex::new(x, Float512::ZERO)
 }
 
-fn inverse(z: Long) -> Long {
+fn inverse(z: LongComplex) -> LongComplex {
     z.conj().scaled(Float512::from(1.0) / z.norm_sqr())
 }
 
-fn modulus(z: Long) -> Float512 {
+fn modulus(z: LongComplex) -> Float512 {
     z.norm_sqr().sqrt()
 }
 
 /// The approximations with exact symmetry: real roots on the axis, the others in conjugate pairs. `None` if
 /// some have no partner.
-fn symmetric(roots: Vec<Long>) -> Option<Vec<Long>> {
-    let is_real = |z: &Long| z.im.nearest().abs() <= REAL_ROOT_TOLERANCE * modulus(*z).nearest();
-    let (real_ones, others): (Vec<Long>, Vec<Long>) = roots.into_iter().partition(is_real);
-    let (upper, lower): (Vec<Long>, Vec<Long>) = others.into_iter().partition(|z| z.im.nearest() > 0.0);
+fn symmetric(roots: Vec<LongComplex>) -> Option<Vec<LongComplex>> {
+    let is_real = |z: &LongComplex| z.im.nearest().abs() <= REAL_ROOT_TOLERANCE * modulus(*z).nearest();
+    let (real_ones, others): (Vec<LongComplex>, Vec<LongComplex>) = roots.into_iter().partition(is_real);
+    let (upper, lower): (Vec<LongComplex>, Vec<LongComplex>) =
+        others.into_iter().partition(|z| z.im.nearest() > 0.0);
     let real_ones = real_ones.into_iter().map(|z| real(z.re));
     let pairs = upper.iter().flat_map(|&z| [z, z.conj()]);
     (upper.len() == lower.len()).then(|| real_ones.chain(pairs).collect())
 }
 
 /// Smith's radius of the disc around centre `i`.
-fn radius(p: &[Float512], centres: &[Long], i: usize) -> f64 {
+fn radius(p: &[Float512], centres: &[LongComplex], i: usize) -> f64 {
     let z = centres[i];
     let others = centres.iter().enumerate().filter(|&(j, _)| j != i);
     let denominator = others.fold(p[0], |product, (_, &other)| product * modulus(z - other));
@@ -165,7 +166,7 @@ fn radius(p: &[Float512], centres: &[Long], i: usize) -> f64 {
 }
 
 /// A bound of |p(z)|. It is computed in the unit of |z|, in which no power of z leaves the range of doubles.
-fn residual(p: &[Float512], z: Long) -> Float512 {
+fn residual(p: &[Float512], z: LongComplex) -> Float512 {
     let (n, unit) = (p.len() as i64 - 1, modulus(z).exponent());
     let power = |k: usize| unit * (n - k as i64);
     let size = (0..p.len()).filter(|&k| p[k] != Float512::ZERO).map(|k| p[k].exponent() + power(k)).max();

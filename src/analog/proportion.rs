@@ -1,11 +1,11 @@
 //! Filters that are exactly proportional, as far as their written forms show it.
 
-use crate::arithmetic::{Ball, Float512};
+use crate::arithmetic::{Ball, Float512, LongBall};
 use crate::spec::FilterSpec;
 
 /// g with `a` = g `b`, if both are written in one form that shows it without rounding: with proportional
 /// coefficients, with the same zeros and poles, or equal. Filters that only agree up to rounding have none.
-pub(crate) fn proportion(a: &FilterSpec, b: &FilterSpec) -> Option<Ball<Float512>> {
+pub(crate) fn proportion(a: &FilterSpec, b: &FilterSpec) -> Option<LongBall> {
     use FilterSpec::{Cascade, TransferFunction, ZeroPoleGain};
     match (a, b) {
         _ if a == b => Some(Ball::from(1.0)),
@@ -28,7 +28,7 @@ pub(crate) fn proportion(a: &FilterSpec, b: &FilterSpec) -> Option<Ball<Float512
 }
 
 /// g with x = g y, leading zeros apart.
-fn common_factor(x: &[f64], y: &[f64]) -> Option<Ball<Float512>> {
+fn common_factor(x: &[f64], y: &[f64]) -> Option<LongBall> {
     let significant = |list: &[f64]| -> Vec<f64> { list.iter().copied().skip_while(|&x| x == 0.0).collect() };
     let (x, y) = (significant(x), significant(y));
     let (&first, &other) = x.first().zip(y.first())?;
@@ -39,7 +39,7 @@ fn common_factor(x: &[f64], y: &[f64]) -> Option<Ball<Float512>> {
 }
 
 /// x / y, exactly where that is a double.
-fn quotient(x: f64, y: f64) -> Ball<Float512> {
+fn quotient(x: f64, y: f64) -> LongBall {
     let rounded = x / y;
     let is_exact = Float512::from(rounded) * Float512::from(y) == Float512::from(x);
     if is_exact { Ball::from(rounded) } else { Ball::from(x) / Ball::from(y) }

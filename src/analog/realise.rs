@@ -6,8 +6,8 @@ use super::families::{self, Member};
 use super::pairing::pair_sections;
 use super::polynomial::enclosed_roots;
 use super::roots::{Factors, RootSet};
-use super::section::{Realisation, Section};
-use crate::arithmetic::{Ball, Float512, Real};
+use super::section::{Biquad, Realisation};
+use crate::arithmetic::{Ball, LongBall, Real};
 use crate::linalg::{Complex, Mat, eigenvalues, inverse, power_of_two, solve, to_complex};
 use crate::spec::{FilterSpec, Passband};
 use crate::units::Seconds;
@@ -15,9 +15,9 @@ use nalgebra::DMatrix;
 
 /// One block of a series, with one input and one output.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Block<T> {
+pub(super) enum SeriesBlock<T> {
     /// One or two poles with at most as many zeros.
-    Section(Section<T>),
+    Section(Biquad<T>),
     /// State equations as the spec gives them.
     State(Realisation<T>),
 }
@@ -26,11 +26,11 @@ pub(super) enum Block<T> {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Chain<T> {
     pub(super) gain: T,
-    pub(super) blocks: Vec<Block<T>>,
+    pub(super) blocks: Vec<SeriesBlock<T>>,
 }
 
 /// A number in which written filters are realised: `f64` for the design, a ball for the proof.
-pub(super) trait Written: Real {
+pub(super) trait RealNumber: Real {
     /// Zeros, poles and gain of `num(s) / den(s)`.
     fn quotient(num: &[f64], den: &[f64]) -> Result<Factors<Self>, AnalogError>;
 
@@ -38,7 +38,7 @@ pub(super) trait Written: Real {
     fn family(member: &Member, passband: Passband, h: Seconds) -> Result<Factors<Self>, AnalogError>;
 }
 
-impl Written for Ball<Float512> {
+impl RealNumber for LongBall {
     fn quotient(num: &[f64], den: &[f64]) -> Result<Factors<Self>, AnalogError> {
         let [num, den] = [num, den].map(without_leading_zeros);
         let (zeros, poles) = (enclosed_roots(num, "num")?, enclosed_roots(den, "den")?);
@@ -50,7 +50,7 @@ impl Written for Ball<Float512> {
     }
 }
 
-impl Written for f64 {
+impl RealNumber for f64 {
     fn quotient(num: &[f64], den: &[f64]) -> Result<Factors<Self>, AnalogError> {
         Ok(Ball::quotient(num, den)?.rounded())
     }
@@ -65,7 +65,7 @@ fn without_leading_zeros(values: &[f64]) -> &[f64] {
     &values[start..]
 }
 
-impl<T: Written> Block<T> {
+impl<T: RealNumber> SeriesBlock<T> {
     pub(super) fn realise(&self) -> Realisation<T> {
         match self {
             Self::Section(section) => section.realise(),
@@ -74,7 +74,7 @@ impl<T: Written> Block<T> {
     }
 }
 
-impl Block<f64> {
+impl SeriesBlock<f64> {
     pub(super) fn response(&self, s: Complex<f64>) -> Complex<f64> {
         match self {
             Self::Section(section) => section.response(s),
@@ -98,7 +98,7 @@ pub(super) fn state_response(state: &Realisation<f64>, s: Complex<f64>) -> Compl
     (to_complex(&state.c) * x)[(0, 0)] + state.d
 }
 
-impl<T: Written> Chain<T> {
+impl<T: RealNumber> Chain<T> {
     /// Normalises by the fast period `h` a filter whose written form has been checked.
     pub(super) fn new(filter: &FilterSpec, h: Seconds) -> Result<Self, AnalogError> {
         let period = T::from(h.0);
@@ -139,7 +139,7 @@ impl<T: Written> Chain<T> {
     fn of_sections(factors: Factors<T>) -> Self {
         let sections = pair_sections(&factors.poles, &factors.zeros);
         let gain = sections.iter().fold(factors.gain, |gain, section| section.unscaled(gain));
-        Self { gain, blocks: sections.into_iter().map(Block::Section).collect() }
+        Self { gain, blocks: sections.into_iter().map(SeriesBlock::Section).collect() }
     }
 
     fn of_matrices(a: &[Vec<f64>], b: &[Vec<f64>], c: &[Vec<f64>], h: T) -> Self {
@@ -150,16 +150,16 @@ impl<T: Written> Chain<T> {
             c: DMatrix::from_fn(1, n, |_, j| T::from(c[0][j])),
             d: T::from(0.0),
         };
-        Self { gain: T::from(1.0), blocks: vec![Block::State(state)] }
+        Self { gain: T::from(1.0), blocks: vec![SeriesBlock::State(state)] }
     }
 
     /// H(s / factor), a positive number.
     pub(super) fn stretched(&self, factor: T) -> Self {
-        let stretched = |block: &Block<T>| match block {
-            Block::Section(Section { poles, zeros }) => {
-                Block::Section(Section { poles: poles.scaled(factor), zeros: zeros.scaled(factor) })
+        let stretched = |block: &SeriesBlock<T>| match block {
+            SeriesBlock::Section(Biquad { poles, zeros }) => {
+                SeriesBlock::Section(Biquad { poles: poles.scaled(factor), zeros: zeros.scaled(factor) })
             }
-            Block::State(state) => Block::State(state.stretched(factor)),
+            SeriesBlock::State(state) => SeriesBlock::State(state.stretched(factor)),
         };
         Self { gain: self.gain, blocks: self.blocks.iter().map(stretched).collect() }
     }

@@ -11,7 +11,7 @@ use super::roots::Roots;
 /// frequency of the poles, a double. The factor makes the section dimensionless, so its gain is about one in
 /// the pass band for any unit of s.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Section<T> {
+pub(super) struct Biquad<T> {
     pub(super) poles: Roots<T>,
     pub(super) zeros: Roots<T>,
 }
@@ -25,7 +25,7 @@ pub(crate) struct Realisation<T> {
     pub(crate) d: T,
 }
 
-impl Section<f64> {
+impl Biquad<f64> {
     /// Value at `s`.
     pub(super) fn response(self, s: Complex<f64>) -> Complex<f64> {
         let scale: f64 = self.unscaled(1.0);
@@ -33,7 +33,7 @@ impl Section<f64> {
     }
 }
 
-impl<T: Real> Section<T> {
+impl<T: Real> Biquad<T> {
     /// `gain` over the factor w^(p-z) that makes the section dimensionless.
     pub(super) fn unscaled(self, gain: T) -> T {
         let w = T::from(self.poles.natural_frequency());

@@ -18,7 +18,7 @@ const PIECES: u64 = 12;
 
 /// A factor without multiple roots, and how often it divides.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Factor {
+pub(super) struct SquareFreeFactor {
     /// In descending powers, each rounded to 512 bits; the first and the last one are not zero.
     pub(super) coefficients: Vec<Float512>,
     pub(super) multiplicity: usize,
@@ -26,10 +26,10 @@ pub(super) struct Factor {
 
 /// The factors of the polynomial with these coefficients in descending powers, of which the first and the
 /// last one are not zero. Their product is the polynomial up to a constant.
-pub(super) fn square_free_factors(coefficients: &[f64]) -> Vec<Factor> {
+pub(super) fn square_free_factors(coefficients: &[f64]) -> Vec<SquareFreeFactor> {
     if has_simple_roots(coefficients) {
         let coefficients = coefficients.iter().map(|&x| Float512::from(x)).collect();
-        return vec![Factor { coefficients, multiplicity: 1 }];
+        return vec![SquareFreeFactor { coefficients, multiplicity: 1 }];
     }
     // Entry k - 1: the product of all roots that occur k times and more, each once.
     let mut layers = Vec::new();
@@ -40,7 +40,7 @@ pub(super) fn square_free_factors(coefficients: &[f64]) -> Vec<Factor> {
         rest = repeated;
     }
     layers.push(vec![BigInt::from(1)]);
-    let exactly = |(k, pair): (usize, &[Vec<BigInt>])| Factor {
+    let exactly = |(k, pair): (usize, &[Vec<BigInt>])| SquareFreeFactor {
         coefficients: quotient(&pair[0], &pair[1]).iter().map(to_long).collect(),
         multiplicity: k + 1,
     };
@@ -171,7 +171,7 @@ fn to_long(x: &BigInt) -> Float512 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arithmetic::Number;
+    use crate::arithmetic::Float;
     use proptest::prelude::*;
 
     fn times(p: &[f64], q: &[f64]) -> Vec<f64> {

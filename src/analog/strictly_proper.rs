@@ -1,6 +1,6 @@
 //! The checked filters.
 
-use crate::arithmetic::{Ball, Float512};
+use crate::arithmetic::LongBall;
 use crate::linalg::{Complex, Mat};
 use crate::spec::FilterSpec;
 use crate::units::{RadiansPerFastPeriod, Seconds};
@@ -178,10 +178,10 @@ impl StrictlyProper {
 /// # Errors
 /// As [`StrictlyProper::new`].
 pub(crate) fn enclosed(
-    signal: Option<&Realisation<Ball<Float512>>>,
+    signal: Option<&Realisation<LongBall>>,
     filter: &FilterSpec,
     h: Seconds,
-) -> Result<Realisation<Ball<Float512>>, AnalogError> {
+) -> Result<Realisation<LongBall>, AnalogError> {
     let realisation = Chain::new(filter, h)?.realise();
     Ok(with_unit_states(signal.map(Realisation::rounded).as_ref(), &realisation))
 }

@@ -2,7 +2,7 @@
 //! adds a bound of its rounding error to the radius. A result encloses the exact result for all values in
 //! the operands; docs/proof.md derives this, down to numbers that no double holds.
 
-use super::{DoubleDouble, Float512, Number};
+use super::{DoubleDouble, Float, Float512};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Compensates for the rounding of the radius itself: at most a dozen operations in double precision.
@@ -17,7 +17,10 @@ pub(crate) struct Ball<F = DoubleDouble> {
     radius: f64,
 }
 
-impl<F: Number> Ball<F> {
+/// A ball of 512 bits.
+pub(crate) type LongBall = Ball<Float512>;
+
+impl<F: Float> Ball<F> {
     pub(crate) const ZERO: Self = Self { mid: F::ZERO, radius: 0.0 };
 
     #[inline]
@@ -105,9 +108,9 @@ impl<F: Number> Ball<F> {
     }
 }
 
-impl Ball<Float512> {
+impl LongBall {
     /// The enclosed numbers in the precision of `F`.
-    pub(crate) fn shortened<F: Number>(self) -> Ball<F> {
+    pub(crate) fn shortened<F: Float>(self) -> Ball<F> {
         if self.radius.is_nan() {
             return Ball::unknown();
         }
@@ -123,14 +126,14 @@ impl Ball<Float512> {
     }
 }
 
-impl<F: Number> From<f64> for Ball<F> {
+impl<F: Float> From<f64> for Ball<F> {
     #[inline]
     fn from(value: f64) -> Self {
         Self { mid: value.into(), radius: 0.0 }
     }
 }
 
-impl<F: Number> Neg for Ball<F> {
+impl<F: Float> Neg for Ball<F> {
     type Output = Self;
     #[inline]
     fn neg(self) -> Self {
@@ -138,7 +141,7 @@ impl<F: Number> Neg for Ball<F> {
     }
 }
 
-impl<F: Number> Add for Ball<F> {
+impl<F: Float> Add for Ball<F> {
     type Output = Self;
     #[inline]
     fn add(self, other: Self) -> Self {
@@ -150,7 +153,7 @@ impl<F: Number> Add for Ball<F> {
     }
 }
 
-impl<F: Number> Sub for Ball<F> {
+impl<F: Float> Sub for Ball<F> {
     type Output = Self;
     #[inline]
     fn sub(self, other: Self) -> Self {
@@ -158,7 +161,7 @@ impl<F: Number> Sub for Ball<F> {
     }
 }
 
-impl<F: Number> Mul for Ball<F> {
+impl<F: Float> Mul for Ball<F> {
     type Output = Self;
     #[inline]
     fn mul(self, other: Self) -> Self {
@@ -170,7 +173,7 @@ impl<F: Number> Mul for Ball<F> {
     }
 }
 
-impl<F: Number> Div for Ball<F> {
+impl<F: Float> Div for Ball<F> {
     type Output = Self;
     /// NaN if the divisor's ball contains zero or reaches out of the normal doubles.
     #[inline]
@@ -214,7 +217,7 @@ mod tests {
     }
 
     /// Balls with midpoints and radii from the least to the largest doubles and beyond.
-    fn any_ball<F: Number>(most: i32) -> impl Strategy<Value = Ball<F>> {
+    fn any_ball<F: Float>(most: i32) -> impl Strategy<Value = Ball<F>> {
         let power = move || prop_oneof![-10..10, -most..most, -1074..-900, 900..1020];
         let radius = prop_oneof![Just(0.0), Just(1e-300), Just(1e300), 1.0..2.0f64];
         (-2.0..2.0f64, power(), power(), radius, power()).prop_map(|(x, p, q, radius, r)| {
@@ -224,30 +227,30 @@ mod tests {
     }
 
     /// Values of a ball: its ends, its middle and another.
-    fn values<F: Number + Into<Exact>>(ball: Ball<F>) -> [Exact; 4] {
+    fn values<F: Float + Into<Exact>>(ball: Ball<F>) -> [Exact; 4] {
         [-1.0, 0.0, 0.75, 1.0].map(|t| ball.mid.into().plus(&Exact::from(ball.radius).times(&t.into())))
     }
 
-    fn is_unknown<F: Number>(ball: Ball<F>) -> bool {
+    fn is_unknown<F: Float>(ball: Ball<F>) -> bool {
         !ball.radius.is_finite()
     }
 
     /// Whether `ball` holds `numerator` / `denominator`.
-    fn holds<F: Number + Into<Exact>>(ball: Ball<F>, numerator: &Exact, denominator: &Exact) -> bool {
+    fn holds<F: Float + Into<Exact>>(ball: Ball<F>, numerator: &Exact, denominator: &Exact) -> bool {
         is_unknown(ball) || {
             let rest = ball.mid.into().times(denominator).minus(numerator);
             rest.is_within(&Exact::from(ball.radius).times(denominator))
         }
     }
 
-    fn holds_root<F: Number + Into<Exact>>(ball: Ball<F>, square: &Exact) -> bool {
+    fn holds_root<F: Float + Into<Exact>>(ball: Ball<F>, square: &Exact) -> bool {
         let [least, .., most] = if is_unknown(ball) { return true } else { values(ball) };
         let zero = Exact::from(0.0);
         let is_low = least.times(&least).is_within(square) || least.plus(&least.abs()).is_within(&zero);
         is_low && square.is_within(&most.times(&most))
     }
 
-    fn all_values_are_held<F: Number + Into<Exact>>(x: Ball<F>, y: Ball<F>) -> Result<(), TestCaseError> {
+    fn all_values_are_held<F: Float + Into<Exact>>(x: Ball<F>, y: Ball<F>) -> Result<(), TestCaseError> {
         let one = Exact::from(1.0);
         for u in values(x) {
             prop_assert!(!x.magnitude().is_finite() || u.is_within(&x.magnitude().into()));

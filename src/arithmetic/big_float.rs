@@ -6,7 +6,7 @@
 //! and a last step with the residual; theirs is below 2^(4 - B) (docs/proof.md derives both). An exponent
 //! beyond [`MAX_EXPONENT`] makes a number unknown, so that nothing overflows or underflows unseen.
 
-use super::number::Number;
+use super::number::Float;
 use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -165,7 +165,7 @@ impl<const WORDS: usize> BigFloat<WORDS> {
     }
 }
 
-impl<const WORDS: usize> Number for BigFloat<WORDS> {
+impl<const WORDS: usize> Float for BigFloat<WORDS> {
     const ZERO: Self = Self { words: [0; WORDS], exponent: 0, negative: false, nan: false };
     /// 2^(6 - B), four times what is proven of the least accurate operation.
     const ROUNDING: f64 = f64::from_bits((1023 + 6 - 64 * WORDS as u64) << 52);

@@ -1,7 +1,7 @@
 //! Complex numbers of any of the real ones.
 
 use super::real::Field;
-use super::{Ball, Float512, Number};
+use super::{Ball, Float, Float512};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A complex number by its parts.
@@ -39,7 +39,7 @@ impl<T: Field> Cartesian<T> {
     }
 }
 
-impl<F: Number> ComplexBall<F> {
+impl<F: Float> ComplexBall<F> {
     /// One of the two square roots.
     pub(crate) fn sqrt(self) -> Self {
         let half = Ball::from(0.5);
@@ -52,14 +52,14 @@ impl<F: Number> ComplexBall<F> {
     }
 }
 
-impl<F: Number> From<Ball<F>> for ComplexBall<F> {
+impl<F: Float> From<Ball<F>> for ComplexBall<F> {
     #[inline]
     fn from(re: Ball<F>) -> Self {
         Self { re, im: Ball::ZERO }
     }
 }
 
-impl<F: Number> From<f64> for ComplexBall<F> {
+impl<F: Float> From<f64> for ComplexBall<F> {
     #[inline]
     fn from(re: f64) -> Self {
         Ball::from(re).into()

@@ -1,8 +1,8 @@
 //! Dense matrices of numbers of extended precision and of balls, for which no library offers decompositions,
 //! and limits by doubling: each step squares the number of steps that it covers.
 
-use super::Number;
-use super::real::Entry;
+use super::Float;
+use super::real::MatrixEntry;
 use nalgebra::DMatrix as Matrix;
 
 /// Maximum number of doublings: 2^40 steps.
@@ -12,7 +12,7 @@ const DOUBLINGS: usize = 40;
 const LIMIT_ACCURACY: f64 = 1e-25;
 
 /// a b. Entries of `a` that are exactly zero are skipped, because delay lines are sparse.
-pub(crate) fn product<T: Entry>(a: &Matrix<T>, b: &Matrix<T>) -> Matrix<T> {
+pub(crate) fn product<T: MatrixEntry>(a: &Matrix<T>, b: &Matrix<T>) -> Matrix<T> {
     assert_eq!(a.ncols(), b.nrows(), "the matrices of a product fit each other");
     let mut result = zeros(a.nrows(), b.ncols());
     for i in 0..a.nrows() {
@@ -26,32 +26,32 @@ pub(crate) fn product<T: Entry>(a: &Matrix<T>, b: &Matrix<T>) -> Matrix<T> {
 }
 
 /// All entries zero.
-pub(crate) fn zeros<T: Entry>(rows: usize, columns: usize) -> Matrix<T> {
+pub(crate) fn zeros<T: MatrixEntry>(rows: usize, columns: usize) -> Matrix<T> {
     Matrix::from_element(rows, columns, T::default())
 }
 
 /// Ones on the diagonal.
-pub(crate) fn identity<T: Entry>(order: usize) -> Matrix<T> {
+pub(crate) fn identity<T: MatrixEntry>(order: usize) -> Matrix<T> {
     Matrix::from_fn(order, order, |i, j| T::from(f64::from(u8::from(i == j))))
 }
 
 /// The rows and columns with these indices.
-pub(crate) fn select<T: Entry>(m: &Matrix<T>, rows: &[usize], columns: &[usize]) -> Matrix<T> {
+pub(crate) fn select<T: MatrixEntry>(m: &Matrix<T>, rows: &[usize], columns: &[usize]) -> Matrix<T> {
     Matrix::from_fn(rows.len(), columns.len(), |i, j| m[(rows[i], columns[j])])
 }
 
 /// The same with the lower triangle copied into the upper one. Both must enclose the same numbers.
-pub(crate) fn symmetric<T: Entry>(m: &Matrix<T>) -> Matrix<T> {
+pub(crate) fn symmetric<T: MatrixEntry>(m: &Matrix<T>) -> Matrix<T> {
     Matrix::from_fn(m.nrows(), m.ncols(), |i, j| m[(i.max(j), i.min(j))])
 }
 
 /// m s m' for a symmetric s, with the sparse factor on the left of both products.
-pub(crate) fn congruence<T: Entry>(m: &Matrix<T>, s: &Matrix<T>) -> Matrix<T> {
+pub(crate) fn congruence<T: MatrixEntry>(m: &Matrix<T>, s: &Matrix<T>) -> Matrix<T> {
     symmetric(&product(m, &product(m, s).transpose()))
 }
 
 /// m^-1 rhs by elimination with row pivoting; `None` if a pivot is zero.
-pub(crate) fn solve<F: Number>(m: &Matrix<F>, rhs: &Matrix<F>) -> Option<Matrix<F>> {
+pub(crate) fn solve<F: Float>(m: &Matrix<F>, rhs: &Matrix<F>) -> Option<Matrix<F>> {
     let (mut left, mut right) = (m.clone(), rhs.clone());
     let n = left.nrows();
     for k in 0..n {
@@ -72,7 +72,7 @@ pub(crate) fn solve<F: Number>(m: &Matrix<F>, rhs: &Matrix<F>) -> Option<Matrix<
 }
 
 /// Row i minus factor times row k, from column `from` on.
-fn subtract_row<F: Number>(m: &mut Matrix<F>, i: usize, factor: F, k: usize, from: usize) {
+fn subtract_row<F: Float>(m: &mut Matrix<F>, i: usize, factor: F, k: usize, from: usize) {
     if factor == F::ZERO {
         return;
     }
@@ -82,7 +82,7 @@ fn subtract_row<F: Number>(m: &mut Matrix<F>, i: usize, factor: F, k: usize, fro
 }
 
 /// U^-1 rhs for an upper triangular U.
-fn back_substituted<F: Number>(upper: &Matrix<F>, mut rhs: Matrix<F>) -> Matrix<F> {
+fn back_substituted<F: Float>(upper: &Matrix<F>, mut rhs: Matrix<F>) -> Matrix<F> {
     for k in (0..rhs.nrows()).rev() {
         for j in 0..rhs.ncols() {
             let known = (k + 1..rhs.nrows()).fold(rhs[(k, j)], |sum, i| sum - upper[(k, i)] * rhs[(i, j)]);
@@ -93,7 +93,7 @@ fn back_substituted<F: Number>(upper: &Matrix<F>, mut rhs: Matrix<F>) -> Matrix<
 }
 
 /// L^-1 rhs for a lower triangular L, whose diagonal has no zeros.
-pub(crate) fn solve_lower<F: Number>(lower: &Matrix<F>, rhs: &Matrix<F>) -> Matrix<F> {
+pub(crate) fn solve_lower<F: Float>(lower: &Matrix<F>, rhs: &Matrix<F>) -> Matrix<F> {
     let mut x = rhs.clone();
     for i in 0..lower.nrows() {
         for j in 0..x.ncols() {
@@ -106,7 +106,7 @@ pub(crate) fn solve_lower<F: Number>(lower: &Matrix<F>, rhs: &Matrix<F>) -> Matr
 
 /// The lower triangular L with L L' = m, of which the lower triangle is read; `None` at the first pivot that
 /// is not positive.
-pub(crate) fn cholesky<F: Number>(m: &Matrix<F>) -> Option<Matrix<F>> {
+pub(crate) fn cholesky<F: Float>(m: &Matrix<F>) -> Option<Matrix<F>> {
     let n = m.nrows();
     // L', so that the rows of L are contiguous.
     let mut upper = zeros(n, n);
@@ -128,7 +128,7 @@ pub(crate) fn cholesky<F: Number>(m: &Matrix<F>) -> Option<Matrix<F>> {
 
 /// The pivots of the elimination without pivoting, in their order. By Sylvester's law a symmetric matrix has
 /// as many negative eigenvalues as negative pivots.
-pub(crate) fn pivots<F: Number>(m: &Matrix<F>) -> Vec<F> {
+pub(crate) fn pivots<F: Float>(m: &Matrix<F>) -> Vec<F> {
     let mut m = m.clone();
     for k in 0..m.nrows() {
         for i in k + 1..m.nrows() {
@@ -143,7 +143,7 @@ pub(crate) fn pivots<F: Number>(m: &Matrix<F>) -> Vec<F> {
 /// (E. K.-W. Chu, H.-Y. Fan, W.-W. Lin, C.-S. Wang, *Structure-preserving algorithms for periodic
 /// discrete-time algebraic Riccati equations*, Int. J. Control 77, 2004). With G = 0 it is the sum of
 /// F^k H F'^k, the Gramian of a stable F. `None` without convergence.
-pub(crate) fn riccati_limit<F: Number>(f: &Matrix<F>, g: &Matrix<F>, h: &Matrix<F>) -> Option<Matrix<F>> {
+pub(crate) fn riccati_limit<F: Float>(f: &Matrix<F>, g: &Matrix<F>, h: &Matrix<F>) -> Option<Matrix<F>> {
     let (mut a, mut g, mut h) = (f.transpose(), g.clone(), h.clone());
     for _ in 0..DOUBLINGS {
         let w = identity(a.nrows()) + product(&g, &h);
@@ -168,19 +168,19 @@ mod tests {
     use super::*;
 
     /// 1 / (i + j + 1): the condition number for n = 12 is 2e16, beyond double precision.
-    fn hilbert<F: Number>(n: usize) -> Matrix<F> {
+    fn hilbert<F: Float>(n: usize) -> Matrix<F> {
         Matrix::from_fn(n, n, |i, j| F::from(1.0) / F::from((i + j + 1) as f64))
     }
 
-    fn size<F: Number>(m: &Matrix<F>) -> f64 {
+    fn size<F: Float>(m: &Matrix<F>) -> f64 {
         m.iter().map(|x| x.nearest().abs()).fold(0.0, f64::max)
     }
 
-    fn distance<F: Number>(a: &Matrix<F>, b: &Matrix<F>) -> f64 {
+    fn distance<F: Float>(a: &Matrix<F>, b: &Matrix<F>) -> f64 {
         size(&(a - b))
     }
 
-    fn inverses_are_integers<F: Number>(accuracy: f64) {
+    fn inverses_are_integers<F: Float>(accuracy: f64) {
         let n = 12;
         let inverse = solve(&hilbert::<F>(n), &identity(n)).unwrap();
         // The corners of the inverse: n^2, and the sum's alternating sign.

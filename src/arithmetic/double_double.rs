@@ -6,7 +6,7 @@
 //! root with one Newton step (5 u^2), for which docs/proof.md derives the bounds. All of them are below
 //! [`ROUNDING`] = 64 u^2 relative; results that underflow are off by less than 2^-1070.
 
-use super::number::Number;
+use super::number::Float;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// 2^-100: bounds the relative error of every operation on [`DoubleDouble`], with room to spare.
@@ -55,7 +55,7 @@ impl DoubleDouble {
     }
 }
 
-impl Number for DoubleDouble {
+impl Float for DoubleDouble {
     const ZERO: Self = Self { high: 0.0, low: 0.0 };
     const ROUNDING: f64 = ROUNDING;
     /// 0.5^30 / 30! = 4e-42.

@@ -1,10 +1,8 @@
 //! Elementary functions of numbers of 512 bits, enclosed: series with a bound for what they leave out, after
 //! an argument reduction in balls.
 
-use super::{Ball, ComplexBall, Float512};
+use super::{Ball, ComplexBall, LongBall};
 use std::sync::OnceLock;
-
-type Long = Ball<Float512>;
 
 /// A term below this, 2^-540, lies below the rounding of every sum of about one.
 const NEGLIGIBLE_TERM: f64 = f64::from_bits((1023 - 540) << 52);
@@ -19,16 +17,16 @@ const MAX_ARGUMENT: f64 = 700.0;
 const ROOT_STEPS: usize = 4;
 
 /// pi = 16 atan(1/5) - 4 atan(1/239) (Machin).
-pub(crate) fn pi() -> Long {
-    static PI: OnceLock<Long> = OnceLock::new();
+pub(crate) fn pi() -> LongBall {
+    static PI: OnceLock<LongBall> = OnceLock::new();
     *PI.get_or_init(|| {
         Ball::from(16.0) * inverse_tangent(5.0, -1.0) - Ball::from(4.0) * inverse_tangent(239.0, -1.0)
     })
 }
 
 /// ln 10 = 46 atanh(1/31) + 34 atanh(1/49) + 20 atanh(1/161).
-pub(crate) fn ln_10() -> Long {
-    static LN_10: OnceLock<Long> = OnceLock::new();
+pub(crate) fn ln_10() -> LongBall {
+    static LN_10: OnceLock<LongBall> = OnceLock::new();
     *LN_10.get_or_init(|| {
         let terms = [(46.0, 31.0), (34.0, 49.0), (20.0, 161.0)];
         terms.iter().fold(Ball::ZERO, |sum, &(factor, n)| sum + Ball::from(factor) * inverse_tangent(n, 1.0))
@@ -37,7 +35,7 @@ pub(crate) fn ln_10() -> Long {
 
 /// The sum of `sign`^k x^(2k+1) / (2k+1) for x = 1/`n`, `n` a whole number above 1: the inverse tangent of x
 /// for the sign -1, the hyperbolic one for 1. The terms left out are below the last power times 1/(1 - x^2).
-fn inverse_tangent(n: f64, sign: f64) -> Long {
+fn inverse_tangent(n: f64, sign: f64) -> LongBall {
     let step = Ball::from(sign) / Ball::from(n * n);
     let (mut power, mut sum, mut odd) = (Ball::from(1.0) / Ball::from(n), Ball::ZERO, 1.0);
     while power.magnitude() > NEGLIGIBLE_TERM {
@@ -49,16 +47,18 @@ fn inverse_tangent(n: f64, sign: f64) -> Long {
 }
 
 /// e^x - 1, relatively accurate for small x too.
-pub(crate) fn exp_m1(x: Long) -> Long {
-    let Some(Reduced { terms, remainder, halvings }) = Reduced::new(x) else { return Ball::unknown() };
+pub(crate) fn exp_m1(x: LongBall) -> LongBall {
+    let Some(ExponentialSeries { terms, remainder, halvings }) = ExponentialSeries::new(x) else {
+        return Ball::unknown();
+    };
     let series = terms[1..].iter().rev().fold(Ball::ZERO, |sum, &term| sum + term);
     // e^2r - 1 = (e^r - 1) (e^r - 1 + 2).
     (0..halvings).fold(series.widened(remainder), |y, _| y * (y + Ball::from(2.0)))
 }
 
 /// cos x + i sin x.
-pub(crate) fn phasor(x: Long) -> ComplexBall {
-    let Some(Reduced { terms, remainder, halvings }) = Reduced::new(x) else {
+pub(crate) fn phasor(x: LongBall) -> ComplexBall {
+    let Some(ExponentialSeries { terms, remainder, halvings }) = ExponentialSeries::new(x) else {
         return ComplexBall::new(Ball::unknown(), Ball::unknown());
     };
     let sum = |first: usize| {
@@ -71,15 +71,15 @@ pub(crate) fn phasor(x: Long) -> ComplexBall {
 }
 
 /// The terms r^k / k! of the exponential series for x = r 2^`halvings`, and a bound of what they leave out.
-struct Reduced {
-    terms: Vec<Long>,
+struct ExponentialSeries {
+    terms: Vec<LongBall>,
     remainder: f64,
     halvings: usize,
 }
 
-impl Reduced {
+impl ExponentialSeries {
     /// `None` for an argument that is unknown or too large.
-    fn new(x: Long) -> Option<Self> {
+    fn new(x: LongBall) -> Option<Self> {
         let mut size = x.magnitude();
         let is_supported = size <= MAX_ARGUMENT;
         let (mut halvings, mut unit) = (0, 1.0);
@@ -101,9 +101,9 @@ impl Reduced {
 
 /// The positive `n`-th root of a positive number. With x = y^n (1 + e) it is y (1 + e)^(1/n), and
 /// |(1 + e)^(1/n) - 1| <= |e| / (n (1 - |e|)).
-pub(crate) fn root(x: Long, n: usize) -> Long {
+pub(crate) fn root(x: LongBall, n: usize) -> LongBall {
     let order = n as f64;
-    let excess = |y: Long| x / power(y, n) - Ball::from(1.0);
+    let excess = |y: LongBall| x / power(y, n) - Ball::from(1.0);
     let start = Ball::from(x.nearest().powf(1.0 / order));
     let y = (0..ROOT_STEPS).fold(start, |y, _| {
         let next = y + y * excess(y) / Ball::from(order);
@@ -115,7 +115,7 @@ pub(crate) fn root(x: Long, n: usize) -> Long {
 }
 
 /// x^n by squaring.
-fn power(x: Long, n: usize) -> Long {
+fn power(x: LongBall, n: usize) -> LongBall {
     match n {
         0 => Ball::from(1.0),
         _ => {
@@ -131,7 +131,7 @@ mod tests {
     use proptest::prelude::*;
 
     /// Digits "d.ddd..", exactly up to the last one.
-    fn digits(text: &str) -> Long {
+    fn digits(text: &str) -> LongBall {
         let fraction = text.split_once('.').unwrap().1;
         let (all, scale) = (text.replace('.', ""), Ball::from(10.0));
         let whole = all.bytes().fold(Ball::ZERO, |sum, c| sum * scale + Ball::from(f64::from(c - b'0')));
@@ -140,7 +140,7 @@ mod tests {
     }
 
     /// Both enclose one number, and the first is narrow.
-    fn agree(found: Long, other: Long) -> bool {
+    fn agree(found: LongBall, other: LongBall) -> bool {
         found.radius() <= 1e-140 * found.nearest().abs()
             && (found - other).lower() <= 0.0
             && (found - other).upper() >= 0.0
@@ -175,7 +175,7 @@ mod tests {
         fn identities_hold(x in -5.0..300.0f64, y in -9.0..2.0f64, n in 1usize..40) {
             let (a, b) = (Ball::from(x), Ball::from(10f64.powf(y)));
             let one = Ball::from(1.0);
-            let grown = |x: Long| exp_m1(x) + one;
+            let grown = |x: LongBall| exp_m1(x) + one;
             let product = grown(a) * grown(b);
             prop_assert!(agree(product, grown(a + b)));
             prop_assert!((exp_m1(b).nearest() / 10f64.powf(y).exp_m1() - 1.0).abs() < 1e-14);

@@ -1,6 +1,6 @@
 //! Real numbers of more than 53 bits, with a proven relative error for each operation.
 //!
-//! [`DoubleDouble`] has 106 bits and [`Float512`] has 512. Both are a [`Number`], the trait over which
+//! [`DoubleDouble`] has 106 bits and [`Float512`] has 512. Both are a [`Float`], the trait over which
 //! enclosures and the decompositions of [`dense`] are generic: [`Ball`] encloses a real number,
 //! [`ComplexBall`] a complex one. A formula that is generic over [`Real`] is computed in doubles and in
 //! balls.
@@ -17,12 +17,12 @@ mod exact;
 mod number;
 mod real;
 
-pub(crate) use ball::{Ball, OUTWARD};
+pub(crate) use ball::{Ball, LongBall, OUTWARD};
 pub(crate) use big_float::{BigFloat, Float512};
 pub(crate) use cartesian::{Cartesian, ComplexBall};
 pub(crate) use double_double::DoubleDouble;
-pub(crate) use number::Number;
-pub(crate) use real::{Entry, Real};
+pub(crate) use number::Float;
+pub(crate) use real::{MatrixEntry, Real};
 
 use std::ops::{AddAssign, SubAssign};
 
@@ -43,4 +43,4 @@ macro_rules! assignments {
     )*};
 }
 
-assignments!([] DoubleDouble, [const WORDS: usize] BigFloat<WORDS>, [F: Number] Ball<F>, [F: Number] ComplexBall<F>);
+assignments!([] DoubleDouble, [const WORDS: usize] BigFloat<WORDS>, [F: Float] Ball<F>, [F: Float] ComplexBall<F>);

@@ -3,7 +3,7 @@
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// A floating-point number whose operations have a proven relative error.
-pub(crate) trait Number:
+pub(crate) trait Float:
     Copy
     + std::fmt::Debug
     + Default

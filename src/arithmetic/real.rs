@@ -1,6 +1,6 @@
 //! What formulas need that are computed in doubles and in balls.
 
-use super::{Ball, Number};
+use super::{Ball, Float};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Numbers with the four operations.
@@ -15,9 +15,9 @@ impl<T> Field for T where
 }
 
 /// What the entries of a matrix are: numbers, or balls.
-pub(crate) trait Entry: Field + nalgebra::Scalar + Default + From<f64> {}
+pub(crate) trait MatrixEntry: Field + nalgebra::Scalar + Default + From<f64> {}
 
-impl<T: Field + nalgebra::Scalar + Default + From<f64>> Entry for T {}
+impl<T: Field + nalgebra::Scalar + Default + From<f64>> MatrixEntry for T {}
 
 /// A real number, exact to rounding (`f64`) or enclosed ([`Ball`]). A formula that is generic over it is
 /// written once for the design and for the proof.
@@ -39,7 +39,7 @@ impl Real for f64 {
     }
 }
 
-impl<F: Number> Real for Ball<F> {
+impl<F: Float> Real for Ball<F> {
     fn to_double(self) -> f64 {
         self.nearest()
     }

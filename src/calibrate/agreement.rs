@@ -2,7 +2,7 @@
 
 use super::contradiction::Contradiction;
 use super::delays::{Delays, delays_told};
-use super::model::Model;
+use super::model::ChannelModel;
 use super::record::{Record, repeated};
 use super::starts::{Starts, starts};
 use crate::spec::Spec;
@@ -159,7 +159,7 @@ pub fn agreement(spec: &Spec, records: &[Record]) -> Agreement {
     if !without_signal.is_empty() {
         return contradicted(without_signal);
     }
-    let Ok(model) = Model::new(spec) else { return Agreement::from(Verdict::Undecided) };
+    let Ok(model) = ChannelModel::new(spec) else { return Agreement::from(Verdict::Undecided) };
     let beginning: Vec<Record> = records.iter().map(|record| record.part(0..ENOUGH_FRAMES)).collect();
     let delays = delays_told(spec, &model, &beginning);
     if delays.contradictions.iter().any(|found| matches!(found, Contradiction::WrongOrder { .. })) {

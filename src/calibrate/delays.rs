@@ -1,11 +1,11 @@
 //! What captures say of the order and the delays of a spec.
 
-use super::Settings;
+use super::CalibrationSettings;
 use super::blind::{Blind, unexplained_in_order};
 use super::contradiction::Contradiction;
 use super::estimates::ChannelEstimate;
-use super::fit::Fit;
-use super::model::Model;
+use super::fit::FittedValues;
+use super::model::ChannelModel;
 use super::order::{from_one, order_of_delays};
 use super::record::Record;
 use crate::sine_fit::Estimate;
@@ -65,15 +65,15 @@ impl Deviation {
 /// What the bands that hold one alias each say of the delays. Something is reported only if the signal then
 /// leaves at most a tenth of the power unexplained that it leaves with the spec, whatever Nyquist zone each
 /// band may belong to.
-pub(super) fn delays_told(spec: &Spec, model: &Model, records: &[Record]) -> Delays {
+pub(super) fn delays_told(spec: &Spec, model: &ChannelModel, records: &[Record]) -> Delays {
     let uncertainty = spec.uncertainty.clone().unwrap_or_default();
     let reference = uncertainty.reference_channel().unwrap_or(0);
     let Ok(blind) = Blind::new(model, records, 1) else { return Delays::default() };
     if let Some(order) = other_order(&blind, records.len()) {
         return Delays::in_order(order);
     }
-    let fit = Fit { delay: true, gain: true, offset: false, cutoff: None };
-    let Ok(fitted) = blind.fit(Settings { fit, reference }) else { return Delays::default() };
+    let fit = FittedValues { delay: true, gain: true, offset: false, cutoff: None };
+    let Ok(fitted) = blind.fit(CalibrationSettings { fit, reference }) else { return Delays::default() };
     let (nominal, found) = blind.unexplained(&fitted.point);
     let fits = fitted.misfit.is_none_or(|misfit| misfit <= WORST_MISFIT);
     let is_clear = fits && found <= CLEARLY_LESS * nominal;
@@ -91,7 +91,7 @@ pub(super) fn delays_told(spec: &Spec, model: &Model, records: &[Record]) -> Del
 }
 
 /// The deviations of all delays that were fitted.
-fn deviations(spec: &Spec, model: &Model, estimates: &[ChannelEstimate]) -> Vec<Deviation> {
+fn deviations(spec: &Spec, model: &ChannelModel, estimates: &[ChannelEstimate]) -> Vec<Deviation> {
     let uncertainty = spec.uncertainty.clone().unwrap_or_default();
     let half_widths = uncertainty.delays(estimates.len());
     let deviation = |(channel, estimate): (usize, &ChannelEstimate)| {

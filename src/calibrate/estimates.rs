@@ -1,8 +1,8 @@
 //! What a calibration found, and a spec with these values.
 
-use super::fit::Kind;
-use super::model::{Model, Point};
-use super::warning::Warning;
+use super::fit::ChannelParameter;
+use super::model::{ChannelModel, ChannelValues};
+use super::warning::CalibrationWarning;
 use crate::linalg::Mat;
 use crate::sine_fit::Estimate;
 use crate::spec::{Cutoff, HALF_WIDTH, OneOrEach, Spec, UncertaintySpec};
@@ -24,7 +24,7 @@ pub struct Calibration {
     /// The part of the front ends whose cut-offs were fitted.
     pub cutoff: Option<Cutoff>,
     /// The tones, if there were any.
-    pub tones: Vec<Tone>,
+    pub tones: Vec<CalibrationTone>,
     /// Delays are known modulo this, if tones were used and leave a second value within a thousand periods
     /// of the highest one.
     pub modulus: Option<FastPeriods>,
@@ -36,7 +36,7 @@ pub struct Calibration {
     /// there is nothing left to judge it by.
     pub misfit: Option<f64>,
     /// What a reader of the estimates must know.
-    pub warnings: Vec<Warning>,
+    pub warnings: Vec<CalibrationWarning>,
 }
 
 /// The values of one channel; `None` where the value of the spec stands.
@@ -54,7 +54,7 @@ pub struct ChannelEstimate {
 
 /// A tone that was used.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tone {
+pub struct CalibrationTone {
     /// Its analog frequency.
     pub frequency: Estimate<Hertz>,
     /// Its Nyquist zone of the slow rate, from 1: zone z lies between (z - 1)/2 and z/2 of the rate.
@@ -66,22 +66,22 @@ pub struct Tone {
 /// Fitted values and their covariance: what all three methods end with.
 #[derive(Debug, Clone)]
 pub(super) struct Fitted {
-    pub(super) point: Point,
+    pub(super) point: ChannelValues,
     /// Of the parameters of `point`.
     pub(super) covariance: Mat,
     /// o_i.
     pub(super) offsets: Option<Vec<Estimate<f64>>>,
-    pub(super) tones: Vec<Tone>,
+    pub(super) tones: Vec<CalibrationTone>,
     pub(super) modulus: Option<FastPeriods>,
     /// Square root of chi squared per degree of freedom, if it could be judged.
     pub(super) misfit: Option<f64>,
     /// Frames that took part.
     pub(super) frames: usize,
-    pub(super) warnings: Vec<Warning>,
+    pub(super) warnings: Vec<CalibrationWarning>,
 }
 
 impl Fitted {
-    pub(super) fn new(point: Point, covariance: Mat, frames: usize) -> Self {
+    pub(super) fn new(point: ChannelValues, covariance: Mat, frames: usize) -> Self {
         let (tones, warnings) = (Vec::new(), Vec::new());
         Self { point, covariance, offsets: None, tones, modulus: None, misfit: None, frames, warnings }
     }
@@ -99,14 +99,14 @@ impl Fitted {
 
     /// Widens the interval of a fitted value so that one standard deviation reaches to another value, so far
     /// away.
-    pub(super) fn reach(&mut self, channel: usize, kind: Kind, distance: f64) {
+    pub(super) fn reach(&mut self, channel: usize, kind: ChannelParameter, distance: f64) {
         if let Some(k) = self.point.index(channel, kind) {
             self.covariance[(k, k)] += distance.powi(2);
         }
     }
 
     /// The channels' values; nominal ones have no standard deviation.
-    pub(super) fn channels(&self, model: &Model) -> Vec<ChannelEstimate> {
+    pub(super) fn channels(&self, model: &ChannelModel) -> Vec<ChannelEstimate> {
         let sigma = |i, kind| self.point.index(i, kind).map(|k| self.covariance[(k, k)].max(0.0).sqrt());
         let channel = |i: usize| {
             let (gain, cutoff) = (self.point.gain(i, model), self.point.ln_cutoffs[i].exp());
@@ -115,9 +115,9 @@ impl Fitted {
             // The parameters are logarithms, so their errors are relative ones.
             let of_factor = |value: f64, sigma: f64| Estimate { value, sigma: sigma * value.abs() };
             ChannelEstimate {
-                delay: sigma(i, Kind::Delay).map(of_delay),
-                gain: sigma(i, Kind::Gain).map(|sigma| of_factor(gain, sigma)),
-                cutoff: sigma(i, Kind::Cutoff).map(|sigma| of_factor(cutoff, sigma)),
+                delay: sigma(i, ChannelParameter::Delay).map(of_delay),
+                gain: sigma(i, ChannelParameter::Gain).map(|sigma| of_factor(gain, sigma)),
+                cutoff: sigma(i, ChannelParameter::Cutoff).map(|sigma| of_factor(cutoff, sigma)),
                 offset: self.offsets.as_ref().map(|all| all[i]),
             }
         };
@@ -142,7 +142,7 @@ fn chi_squared_quantile(freedom: usize, z: f64) -> f64 {
 /// `spec` with the values of `calibration` and an `[uncertainty]` table with their half-widths. Values that
 /// were not fitted stay, and so do their half-widths. Delays that would be negative raise all
 /// delays and the latency by whole fast periods.
-pub fn applied(spec: &Spec, calibration: &Calibration) -> (Spec, Vec<Warning>) {
+pub fn applied(spec: &Spec, calibration: &Calibration) -> (Spec, Vec<CalibrationWarning>) {
     let (mut new, h) = (spec.clone(), spec.fast_period);
     for (channel, found) in new.channels.iter_mut().zip(&calibration.channels) {
         channel.delay = found.delay.map_or(channel.delay, |delay| delay.value.in_seconds(h));
@@ -165,7 +165,7 @@ pub fn applied(spec: &Spec, calibration: &Calibration) -> (Spec, Vec<Warning>) {
         }),
         reference: Some(calibration.reference + 1),
     });
-    let warnings = raise(&mut new, h).map(|periods| Warning::Shifted { periods });
+    let warnings = raise(&mut new, h).map(|periods| CalibrationWarning::Shifted { periods });
     (new, warnings.into_iter().collect())
 }
 

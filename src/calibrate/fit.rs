@@ -5,7 +5,7 @@ use std::fmt;
 
 /// Which values of the channels are fitted; the others keep those of the spec.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Fit {
+pub struct FittedValues {
     /// Delays.
     pub delay: bool,
     /// Gains.
@@ -16,20 +16,24 @@ pub struct Fit {
     pub cutoff: Option<Cutoff>,
 }
 
-impl Default for Fit {
+impl Default for FittedValues {
     /// Delays, gains and offsets.
     fn default() -> Self {
         Self { delay: true, gain: true, offset: true, cutoff: None }
     }
 }
 
-impl Fit {
+impl FittedValues {
     /// Nothing.
     pub const NOTHING: Self = Self { delay: false, gain: false, offset: false, cutoff: None };
 
     /// The fitted parameters of a channel that is not the reference.
-    pub(super) fn kinds(self) -> Vec<Kind> {
-        let all = [(self.delay, Kind::Delay), (self.gain, Kind::Gain), (self.cutoff.is_some(), Kind::Cutoff)];
+    pub(super) fn kinds(self) -> Vec<ChannelParameter> {
+        let all = [
+            (self.delay, ChannelParameter::Delay),
+            (self.gain, ChannelParameter::Gain),
+            (self.cutoff.is_some(), ChannelParameter::Cutoff),
+        ];
         all.into_iter().filter_map(|(is_fitted, kind)| is_fitted.then_some(kind)).collect()
     }
 
@@ -47,14 +51,14 @@ impl Fit {
 }
 
 /// These values and no others.
-impl FromIterator<Fitting> for Fit {
+impl FromIterator<Fitting> for FittedValues {
     fn from_iter<I: IntoIterator<Item = Fitting>>(values: I) -> Self {
         values.into_iter().fold(Self::NOTHING, Self::with)
     }
 }
 
 /// The names of what is fitted, with commas, as in `delay,gain,cutoff:2`.
-impl fmt::Display for Fit {
+impl fmt::Display for FittedValues {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let flags =
             [(self.delay, Fitting::Delay), (self.gain, Fitting::Gain), (self.offset, Fitting::Offset)];
@@ -66,7 +70,7 @@ impl fmt::Display for Fit {
 
 /// A parameter of a channel. Gains and cut-offs are fitted by their logarithm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum ChannelParameter {
     Delay,
     Gain,
     Cutoff,
@@ -78,7 +82,7 @@ mod tests {
 
     #[test]
     fn what_is_fitted_has_the_names_of_its_values() {
-        let fit: Fit = [Fitting::Cutoff(Cutoff::Stage(1)), Fitting::Delay].into_iter().collect();
+        let fit: FittedValues = [Fitting::Cutoff(Cutoff::Stage(1)), Fitting::Delay].into_iter().collect();
         assert_eq!(fit.to_string(), "delay,cutoff:2");
     }
 }

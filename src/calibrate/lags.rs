@@ -6,7 +6,7 @@
 
 use super::record::Record;
 use crate::linalg::{Complex, fourier};
-use crate::simulate::{Instants, Recording};
+use crate::simulate::{Instants, Periodic};
 use crate::sine_fit::Channel;
 use crate::units::FastPeriods;
 use std::f64::consts::TAU;
@@ -100,7 +100,7 @@ pub(crate) fn steadied(record: &Record, first: usize, length: usize, rate: f64) 
         stretch(record, first as i64 - INTERPOLATION_MARGIN as i64, length + 2 * INTERPOLATION_MARGIN);
     let begin = INTERPOLATION_MARGIN as f64 - 0.5 * rate * (length as f64 - 1.0);
     let instants = Instants { first: FastPeriods(begin), step: FastPeriods(1.0 + rate), count: length };
-    let steady = Recording::new(&around, FastPeriods(1.0)).sample_through(|_| Complex::ONE, instants);
+    let steady = Periodic::new(&around, FastPeriods(1.0)).sample_through(|_| Complex::ONE, instants);
     for ((sample, steady), own) in part.samples.iter_mut().zip(steady).zip(&around[INTERPOLATION_MARGIN..]) {
         *sample += steady - own;
     }
@@ -113,7 +113,7 @@ pub(crate) fn interpolated(record: &Record, instants: Instants) -> Vec<f64> {
     let length = (instants.step.0 * instants.count as f64) as usize + 2 * INTERPOLATION_MARGIN + 1;
     let around = stretch(record, begin, length);
     let first = FastPeriods(instants.first.0 - begin as f64);
-    Recording::new(&around, FastPeriods(1.0)).sample_through(|_| Complex::ONE, Instants { first, ..instants })
+    Periodic::new(&around, FastPeriods(1.0)).sample_through(|_| Complex::ONE, Instants { first, ..instants })
 }
 
 /// The correlations of a stretch of `size` samples with a shorter one: at index l that of its samples from l
@@ -147,13 +147,13 @@ impl Correlation {
 /// The largest correlations of a probe.
 #[derive(Default)]
 struct Peaks {
-    largest: Vec<Peak>,
+    largest: Vec<CorrelationPeak>,
     squares: f64,
     count: usize,
 }
 
 #[derive(Clone, Copy)]
-struct Peak {
+struct CorrelationPeak {
     lag: i64,
     /// Share of the largest correlation that is possible.
     height: f64,
@@ -207,13 +207,13 @@ impl Peaks {
             self.squares += height * height;
             self.count += usize::from(height > 0.0);
             if height >= at(l + heights.len() - 1) && height >= at(l + 1) {
-                self.offer(Peak { lag, height });
+                self.offer(CorrelationPeak { lag, height });
             }
         }
     }
 
-    fn offer(&mut self, peak: Peak) {
-        let is_near = |other: &Peak| ((other.lag - peak.lag) as f64).abs() <= NEIGHBOURS;
+    fn offer(&mut self, peak: CorrelationPeak) {
+        let is_near = |other: &CorrelationPeak| ((other.lag - peak.lag) as f64).abs() <= NEIGHBOURS;
         if self.largest.iter().any(|other| is_near(other) && other.height >= peak.height) {
             return;
         }
@@ -226,7 +226,7 @@ impl Peaks {
     /// Those of probe `number` at a sample.
     fn lags(&self, number: usize, at: f64) -> Vec<Lag> {
         let chance = (self.squares / self.count.max(1) as f64).sqrt();
-        let lag = |&Peak { lag, height }: &Peak| Lag {
+        let lag = |&CorrelationPeak { lag, height }: &CorrelationPeak| Lag {
             at,
             lag: lag as f64,
             sigmas: height / chance,

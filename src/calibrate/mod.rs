@@ -30,8 +30,8 @@
 //! blind:     the inverse of the Fisher information of the Whittle likelihood
 //! ```
 //!
-//! What spoils an estimate and can be recognised is refused ([`CalibrateError`]) or noted ([`Warning`]);
-//! where the data contradict the model, the intervals are widened by the misfit.
+//! What spoils an estimate and can be recognised is refused ([`CalibrateError`]) or noted
+//! ([`CalibrationWarning`]); where the data contradict the model, the intervals are widened by the misfit.
 
 mod agreement;
 mod blind;
@@ -55,13 +55,13 @@ mod waveform;
 pub use agreement::{Agreement, ENOUGH_FRAMES, Verdict, agreement, comparable, frames_for_agreement};
 pub use contradiction::Contradiction;
 pub use error::CalibrateError;
-pub use estimates::{Calibration, ChannelEstimate, Tone, applied};
-pub use fit::Fit;
+pub use estimates::{Calibration, CalibrationTone, ChannelEstimate, applied};
+pub use fit::FittedValues;
 pub(crate) use lags::{Correlation, LagLine, interpolated, line, steadied, stretch};
-pub(crate) use model::Model;
+pub(crate) use model::ChannelModel;
 pub(crate) use record::longest_run;
 pub use record::{Acquisition, Record};
-pub use warning::Warning;
+pub use warning::CalibrationWarning;
 
 pub use crate::spec::{Cutoff, Fitting, UnknownFitting};
 
@@ -96,9 +96,9 @@ pub enum CalibrationSignal {
 
 /// What to fit, and relative to what.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Settings {
+pub struct CalibrationSettings {
     /// The values that are fitted.
-    pub fit: Fit,
+    pub fit: FittedValues,
     /// The reference channel, from 0.
     pub reference: usize,
 }
@@ -117,7 +117,7 @@ pub fn calibrate(
     spec: &Spec,
     records: &[Record],
     signal: &CalibrationSignal,
-    settings: Settings,
+    settings: CalibrationSettings,
 ) -> Result<Calibration, CalibrateError> {
     calibrate_pooled(spec, &[Acquisition { name: "the captures", records }], signal, settings)
 }
@@ -131,14 +131,14 @@ pub fn calibrate_pooled(
     spec: &Spec,
     acquisitions: &[Acquisition<'_>],
     signal: &CalibrationSignal,
-    settings: Settings,
+    settings: CalibrationSettings,
 ) -> Result<Calibration, CalibrateError> {
     for Acquisition { name, records } in acquisitions {
         check(spec, records, settings)
             .and_then(|()| check_parts(records, signal))
             .map_err(|error| error.within(name, acquisitions.len()))?;
     }
-    let (mut model, reference) = (Model::new(spec)?, settings.reference);
+    let (mut model, reference) = (ChannelModel::new(spec)?, settings.reference);
     if let Some(part) = settings.fit.cutoff {
         model = model.scaling(part, spec)?;
     }
@@ -167,7 +167,7 @@ pub fn calibrate_pooled(
     };
     let clipped: Vec<usize> = spec.layout().ranges().into_iter().map(clipped_in).collect();
     if clipped.iter().any(|&count| count > 0) {
-        fitted.warnings.push(Warning::Clipped { counts: clipped.clone() });
+        fitted.warnings.push(CalibrationWarning::Clipped { counts: clipped.clone() });
     }
     let channels = fitted.channels(&model);
     // Given tones may be contradicted, which widens the intervals and is said elsewhere.
@@ -177,7 +177,7 @@ pub fn calibrate_pooled(
     }
     let is_near_one = |value: f64| (value - 1.0).abs() < MOST_OFFSET;
     if channels.iter().all(|channel| channel.offset.is_some_and(|offset| is_near_one(offset.value))) {
-        fitted.warnings.push(Warning::OffsetBinary);
+        fitted.warnings.push(CalibrationWarning::OffsetBinary);
     }
     let Fitted { tones, modulus, misfit, frames, warnings, .. } = fitted;
     let cutoff = settings.fit.cutoff;
@@ -205,7 +205,11 @@ pub(crate) fn check_parts(records: &[Record], signal: &CalibrationSignal) -> Res
 }
 
 /// Refuses records and settings that do not belong to a spec.
-pub(crate) fn check(spec: &Spec, records: &[Record], settings: Settings) -> Result<(), CalibrateError> {
+pub(crate) fn check(
+    spec: &Spec,
+    records: &[Record],
+    settings: CalibrationSettings,
+) -> Result<(), CalibrateError> {
     let (channels, needed) = (spec.channels.len(), spec.layout().count());
     if records.len() != needed {
         return Err(CalibrateError::ChannelCount { channels: needed, records: records.len() });
@@ -216,7 +220,7 @@ pub(crate) fn check(spec: &Spec, records: &[Record], settings: Settings) -> Resu
     if settings.reference >= channels {
         return Err(CalibrateError::NoSuchReference { reference: settings.reference + 1, channels });
     }
-    if settings.fit == Fit::NOTHING {
+    if settings.fit == FittedValues::NOTHING {
         return Err(CalibrateError::NothingToFit);
     }
     match record::repeated(records) {

@@ -2,7 +2,7 @@
 //! and the present values. Time counts in fast periods.
 
 use super::error::CalibrateError;
-use super::fit::{Fit, Kind};
+use super::fit::{ChannelParameter, FittedValues};
 use crate::analog::{AnalogError, StableFilter, StrictlyProper};
 use crate::linalg::{CMat, Complex};
 use crate::spec::{Band, ChannelSpec, Cutoff, FilterSpec, SignalSpec, Spec};
@@ -27,7 +27,7 @@ const MOST_ZONES: f64 = 1e6;
 ///
 /// where c_i scales the cut-off frequency of its front end, or of one stage of it.
 #[derive(Debug, Clone)]
-pub(crate) struct Model {
+pub(crate) struct ChannelModel {
     /// M.
     pub(super) ratio: usize,
     /// h.
@@ -40,12 +40,12 @@ pub(crate) struct Model {
     pub(super) offsets: Vec<f64>,
     pub(super) front_ends: Vec<StrictlyProper>,
     /// The stages that c_i scales, if it does not scale the whole front ends.
-    stages: Option<Vec<Stage>>,
+    stages: Option<Vec<FrontEndStage>>,
     /// The Nyquist zone of the fast rate, from 0, in which the signal lies.
     pub(super) fast_zone: usize,
 }
 
-impl Model {
+impl ChannelModel {
     /// The model of `spec`.
     ///
     /// # Errors
@@ -78,7 +78,7 @@ impl Model {
                 let stage = number + 1;
                 return Err(CalibrateError::NoSuchStage { channel, stage, stages: stages.len() });
             }
-            Stage::new(stages, number, self.fast_period).map_err(|source| CalibrateError::Stage {
+            FrontEndStage::new(stages, number, self.fast_period).map_err(|source| CalibrateError::Stage {
                 channel,
                 stage: number + 1,
                 source: Box::new(source),
@@ -130,7 +130,7 @@ impl Model {
 
     /// A_ik = g_i Phi_i(j nu_k / c_i) e^{-2 pi j k D_i / M}: the phase e^{-j W D_i / M} that all aliases
     /// share is removed from the spectral matrices.
-    pub(super) fn steering(&self, point: &Point, w: f64, aliases: &[i32]) -> CMat {
+    pub(super) fn steering(&self, point: &ChannelValues, w: f64, aliases: &[i32]) -> CMat {
         CMat::from_fn(self.channels(), aliases.len(), |i, column| {
             let alias = aliases[column];
             let cycles = (f64::from(alias) * point.delays[i] / self.ratio as f64).fract();
@@ -142,13 +142,13 @@ impl Model {
 
 /// One stage of a front end.
 #[derive(Debug, Clone)]
-struct Stage {
+struct FrontEndStage {
     scaled: StableFilter,
     /// The stages before and after it, if there are any.
     others: Option<StableFilter>,
 }
 
-impl Stage {
+impl FrontEndStage {
     /// Number `number` (from 0) of these.
     fn new(stages: &[FilterSpec], number: usize, h: Seconds) -> Result<Self, AnalogError> {
         let others = [&stages[..number], &stages[number + 1..]].concat();
@@ -189,12 +189,12 @@ fn fast_zone(spec: &Spec) -> Result<usize, CalibrateError> {
 pub(super) struct Parameter {
     /// From 0; never the reference.
     pub(super) channel: usize,
-    pub(super) kind: Kind,
+    pub(super) kind: ChannelParameter,
 }
 
 /// The present values of all channels.
 #[derive(Debug, Clone)]
-pub(super) struct Point {
+pub(super) struct ChannelValues {
     pub(super) parameters: Vec<Parameter>,
     /// Fast periods.
     pub(super) delays: Vec<f64>,
@@ -204,9 +204,9 @@ pub(super) struct Point {
     pub(super) ln_cutoffs: Vec<f64>,
 }
 
-impl Point {
+impl ChannelValues {
     /// The values of the spec.
-    pub(super) fn nominal(model: &Model, fit: Fit, reference: usize) -> Self {
+    pub(super) fn nominal(model: &ChannelModel, fit: FittedValues, reference: usize) -> Self {
         let of = |channel| fit.kinds().into_iter().map(move |kind| Parameter { channel, kind });
         Self {
             parameters: model.others(reference).flat_map(of).collect(),
@@ -217,7 +217,7 @@ impl Point {
     }
 
     /// g_i.
-    pub(super) fn gain(&self, i: usize, model: &Model) -> f64 {
+    pub(super) fn gain(&self, i: usize, model: &ChannelModel) -> f64 {
         model.gains[i] * self.ln_gains[i].exp()
     }
 
@@ -225,16 +225,16 @@ impl Point {
     pub(super) fn advance(&mut self, step: &[f64]) {
         for (parameter, step) in self.parameters.iter().zip(step) {
             let values = match parameter.kind {
-                Kind::Delay => &mut self.delays,
-                Kind::Gain => &mut self.ln_gains,
-                Kind::Cutoff => &mut self.ln_cutoffs,
+                ChannelParameter::Delay => &mut self.delays,
+                ChannelParameter::Gain => &mut self.ln_gains,
+                ChannelParameter::Cutoff => &mut self.ln_cutoffs,
             };
             values[parameter.channel] += step;
         }
     }
 
     /// The index of a parameter.
-    pub(super) fn index(&self, channel: usize, kind: Kind) -> Option<usize> {
+    pub(super) fn index(&self, channel: usize, kind: ChannelParameter) -> Option<usize> {
         self.parameters.iter().position(|&p| p == Parameter { channel, kind })
     }
 }

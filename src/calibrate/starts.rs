@@ -13,9 +13,9 @@
 //! is large, other starts and signs are tried, one channel after another: the peaks of the
 //! cross-correlations.
 
-use super::blind::{Band, Spectra};
-use super::fit::Fit;
-use super::model::{Model, Point};
+use super::blind::{Spectra, SpectralBand};
+use super::fit::FittedValues;
+use super::model::{ChannelModel, ChannelValues};
 use super::record::{Record, longest_run};
 use crate::linalg::{CMat, Complex, fourier};
 use crate::sine_fit::Channel;
@@ -75,13 +75,18 @@ pub(super) struct Starts {
 
 /// The starts that explain the captures clearly better than the nominal ones, or these. `None` where the
 /// captures do not tell: too few frames, no signal, or many starts alike.
-pub(super) fn starts(model: &Model, records: &[Record]) -> Option<Starts> {
+pub(super) fn starts(model: &ChannelModel, records: &[Record]) -> Option<Starts> {
     let (first, frames) = longest_run(records);
     if frames < LEAST_FRAMES {
         return None;
     }
     let captures = records.iter().map(|record| &record.samples[first..first + frames]).collect();
-    let search = Search { model, nominal: Point::nominal(model, Fit::default(), 0), captures, frames };
+    let search = StartSearch {
+        model,
+        nominal: ChannelValues::nominal(model, FittedValues::default(), 0),
+        captures,
+        frames,
+    };
     let nominal = search.judged(vec![0; records.len()], vec![1.0; records.len()])?;
     if nominal.unexplained <= UNEXPLAINED_SHARE {
         return Some(nominal);
@@ -92,14 +97,14 @@ pub(super) fn starts(model: &Model, records: &[Record]) -> Option<Starts> {
     Some(if is_clear { found } else { nominal })
 }
 
-struct Search<'a> {
-    model: &'a Model,
-    nominal: Point,
+struct StartSearch<'a> {
+    model: &'a ChannelModel,
+    nominal: ChannelValues,
     captures: Vec<&'a [f64]>,
     frames: usize,
 }
 
-impl Search<'_> {
+impl StartSearch<'_> {
     /// The nominal starts changed channel by channel as long as that explains more; `None` if a channel has
     /// several starts that explain the captures alike.
     fn improved(&self, nominal: &Starts) -> Option<Starts> {
@@ -170,7 +175,7 @@ impl Search<'_> {
     }
 
     /// The spectral matrices of the captures from the assumed starts on.
-    fn bands(&self, early: &[i64]) -> Option<Vec<Band>> {
+    fn bands(&self, early: &[i64]) -> Option<Vec<SpectralBand>> {
         let least = early.iter().min()?;
         let skips = early.iter().map(|d| usize::try_from(d - least).unwrap_or(usize::MAX));
         let skips: Vec<usize> = skips.collect();
@@ -186,7 +191,7 @@ impl Search<'_> {
     /// How well starts and signs explain the captures.
     fn judged(&self, early: Vec<i64>, signs: Vec<f64>) -> Option<Starts> {
         let mut bands = self.bands(&early)?;
-        let powers: Vec<f64> = bands.iter().map(Band::power).collect();
+        let powers: Vec<f64> = bands.iter().map(SpectralBand::power).collect();
         let width = powers.iter().sum::<f64>().powi(2) / powers.iter().map(|p| p * p).sum::<f64>();
         let columns: Vec<Vec<CMat>> = bands.iter().map(|band| self.columns(band.w)).collect();
         let gains = self.gains(&bands, &columns);
@@ -211,7 +216,7 @@ impl Search<'_> {
 
     /// The power of each channel over that which the spec expects of the mean signal, as a factor of the
     /// gain.
-    fn gains(&self, bands: &[Band], columns: &[Vec<CMat>]) -> Vec<f64> {
+    fn gains(&self, bands: &[SpectralBand], columns: &[Vec<CMat>]) -> Vec<f64> {
         let gain = |i: usize| {
             let (mut found, mut expected) = (0.0, 0.0);
             for (band, columns) in bands.iter().zip(columns) {

@@ -1,14 +1,14 @@
 //! What a reader of the estimates must know.
 
 use super::error::list;
-use super::fit::Fit;
+use super::fit::FittedValues;
 use crate::spec::Cutoff;
 use crate::units::{FastPeriods, Hertz};
 
 /// A property of the captures that limits what the estimates mean.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Warning {
+pub enum CalibrationWarning {
     /// Clipped samples were left out.
     #[error("clipped samples were left out, per channel: {}", list(counts))]
     Clipped {
@@ -57,7 +57,7 @@ pub enum Warning {
     )]
     CutoffExplains {
         /// What to fit.
-        fit: Fit,
+        fit: FittedValues,
         /// Square root of chi squared per degree of freedom with it.
         misfit: f64,
     },
@@ -146,14 +146,14 @@ pub enum Warning {
     },
 }
 
-impl Warning {
+impl CalibrationWarning {
     /// Whether it only says what the estimates mean; the others say that they are doubtful.
     pub fn is_note(&self) -> bool {
         matches!(self, Self::CutoffAssumed { .. } | Self::HarmonicsLeftOut { .. } | Self::Shifted { .. })
     }
 }
 
-fn part(fit: Fit) -> String {
+fn part(fit: FittedValues) -> String {
     match fit.cutoff {
         Some(Cutoff::Stage(stage)) => format!("the cut-offs of stage {} of the filters", stage + 1),
         _ => "the cut-offs".to_owned(),

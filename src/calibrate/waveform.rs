@@ -13,16 +13,16 @@
 #[cfg(test)]
 mod tests;
 
-use super::Settings;
+use super::CalibrationSettings;
 use super::error::CalibrateError;
 use super::estimates::{Fitted, WORST_CONDITION};
-use super::fit::Kind;
-use super::model::{Model, Point};
+use super::fit::ChannelParameter;
+use super::model::{ChannelModel, ChannelValues};
 use super::record::Record;
-use super::warning::Warning;
+use super::warning::CalibrationWarning;
 use crate::linalg::least_squares::{LeastSquares, NoMinimum, NormalEquations, StepLimits, minimise};
 use crate::linalg::{Mat, fourier};
-use crate::simulate::{Instants, Recording};
+use crate::simulate::{Instants, Periodic};
 use crate::sine_fit::{Channel, Estimate};
 use crate::units::{FastPeriods, RadiansPerFastPeriod};
 
@@ -50,25 +50,25 @@ const MOST_NOISE_LAGS: usize = 256;
 
 /// A known waveform, and the captures that hold it.
 pub(super) struct Training<'a> {
-    model: &'a Model,
+    model: &'a ChannelModel,
     records: &'a [Record],
-    settings: Settings,
-    recording: Recording,
+    settings: CalibrationSettings,
+    recording: Periodic,
 }
 
 impl<'a> Training<'a> {
     pub(super) fn new(
-        model: &'a Model,
+        model: &'a ChannelModel,
         records: &'a [Record],
         samples: &[f64],
         spacing: FastPeriods,
-        settings: Settings,
+        settings: CalibrationSettings,
     ) -> Result<Self, CalibrateError> {
         let is_usable = samples.len() >= LEAST_SAMPLES && samples.iter().all(|x| x.is_finite());
         if !(is_usable && spacing.0 > 0.0 && spacing.0.is_finite()) {
             return Err(CalibrateError::Waveform { samples: samples.len(), spacing });
         }
-        Ok(Self { model, records, settings, recording: Recording::new(samples, spacing) })
+        Ok(Self { model, records, settings, recording: Periodic::new(samples, spacing) })
     }
 
     /// Calibrates. The reference comes first: its lag is the best start for the others.
@@ -139,8 +139,8 @@ impl<'a> Training<'a> {
 
     /// The values relative to the reference, with the errors of both.
     fn relative(&self, solved: &[Solved]) -> Fitted {
-        let Self { model, settings: Settings { fit, reference }, .. } = *self;
-        let point = Point::nominal(model, fit, reference);
+        let Self { model, settings: CalibrationSettings { fit, reference }, .. } = *self;
+        let point = ChannelValues::nominal(model, fit, reference);
         let first = &solved[reference];
         let variance =
             |solved: &Solved, k: usize| solved.covariance[(k, k)] * solved.correlation_factor.powi(2);
@@ -152,16 +152,16 @@ impl<'a> Training<'a> {
         for (k, parameter) in point.parameters.iter().enumerate() {
             let (i, own) = (parameter.channel, &solved[parameter.channel]);
             let (step, variance) = match parameter.kind {
-                Kind::Delay => {
+                ChannelParameter::Delay => {
                     let nominal = model.delays[i] - model.delays[reference];
                     (own.values[0] - first.values[0] - nominal, both(own, 0, |_| 1.0))
                 }
-                Kind::Gain => {
+                ChannelParameter::Gain => {
                     let scale = first.values[1] / model.gains[reference];
                     let relative = own.values[1] / scale / model.gains[i];
                     (relative.abs().ln(), both(own, 1, |solved| solved.values[1]))
                 }
-                Kind::Cutoff => (own.values[3], variance(own, 3)),
+                ChannelParameter::Cutoff => (own.values[3], variance(own, 3)),
             };
             steps.push(step);
             covariance[(k, k)] = variance;
@@ -174,7 +174,7 @@ impl<'a> Training<'a> {
             fitted.offsets = Some(solved.iter().map(offset).collect());
         }
         let factors = solved.iter().map(|solved| solved.correlation_factor).enumerate();
-        let warning = |(i, misfit)| Warning::ResidualNotWhite { channel: i + 1, misfit };
+        let warning = |(i, misfit)| CalibrationWarning::ResidualNotWhite { channel: i + 1, misfit };
         fitted.warnings.extend(factors.filter(|(_, factor)| *factor > 1.0).map(warning));
         fitted
     }
@@ -184,8 +184,8 @@ impl<'a> Training<'a> {
 struct ChannelFit<'a> {
     channel: usize,
     record: &'a Record,
-    recording: &'a Recording,
-    model: &'a Model,
+    recording: &'a Periodic,
+    model: &'a ChannelModel,
     ratio: f64,
     /// D + L, g, o, ln c.
     values: [f64; 4],

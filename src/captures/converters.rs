@@ -39,25 +39,25 @@ impl FileFormat {
 /// The converters of a bank or a spec.
 #[derive(Debug, Clone)]
 pub struct Converters<'a> {
-    source: Source<'a>,
+    source: ConverterSource<'a>,
     layout: FrameLayout,
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Source<'a> {
+enum ConverterSource<'a> {
     Bank(&'a Bank),
     Spec(&'a Spec),
 }
 
 impl<'a> From<&'a Bank> for Converters<'a> {
     fn from(bank: &'a Bank) -> Self {
-        Self { source: Source::Bank(bank), layout: bank.layout() }
+        Self { source: ConverterSource::Bank(bank), layout: bank.layout() }
     }
 }
 
 impl<'a> From<&'a Spec> for Converters<'a> {
     fn from(spec: &'a Spec) -> Self {
-        Self { source: Source::Spec(spec), layout: spec.layout() }
+        Self { source: ConverterSource::Spec(spec), layout: spec.layout() }
     }
 }
 
@@ -69,16 +69,16 @@ impl Converters<'_> {
 
     fn spec(&self) -> Option<&Spec> {
         match self.source {
-            Source::Bank(bank) => bank.spec.as_ref(),
-            Source::Spec(spec) => Some(spec),
+            ConverterSource::Bank(bank) => bank.spec.as_ref(),
+            ConverterSource::Spec(spec) => Some(spec),
         }
     }
 
     /// In periods of the output.
     fn delays(&self) -> Vec<FastPeriods> {
         match self.source {
-            Source::Bank(bank) => bank.delays_in_fast_periods(),
-            Source::Spec(spec) => spec.delays_in_fast_periods(),
+            ConverterSource::Bank(bank) => bank.delays_in_fast_periods(),
+            ConverterSource::Spec(spec) => spec.delays_in_fast_periods(),
         }
     }
 
@@ -119,8 +119,8 @@ impl Converters<'_> {
     /// [`InputMismatch`].
     pub fn check(&self, name: &str, reader: &MultiReader) -> Result<Option<f64>, InputMismatch> {
         match self.source {
-            Source::Spec(spec) => matching::check_rate(spec, reader).map(|()| None),
-            Source::Bank(bank) => {
+            ConverterSource::Spec(spec) => matching::check_rate(spec, reader).map(|()| None),
+            ConverterSource::Bank(bank) => {
                 matching::check_channels(&self.layout, name, reader)?;
                 matching::output_rate(bank, reader).map(Some)
             }

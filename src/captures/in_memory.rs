@@ -3,7 +3,7 @@
 use super::{CaptureError, ChannelSamples};
 use crate::calibrate::Record;
 use crate::io::{DecodedFrames, MultiReader, OfflineSamples};
-use crate::runtime::Input;
+use crate::runtime::FrameSource;
 use crate::units::Hertz;
 
 /// Captures that were taken together.

@@ -2,9 +2,9 @@
 
 use super::limits::{Stage, Stop, TIME_LIMIT, remedy};
 use super::methods::robust_fir::RobustStudy;
-use super::methods::{self, Settings, Synthesis};
+use super::methods::{self, MethodSettings, Synthesis};
 use super::plant::LiftedPlant;
-use super::preparation::{Comparison, merged, settings};
+use super::preparation::{SizingControl, merged, settings};
 use super::problem::Problem;
 use super::quantise::WordStudy;
 use super::realise::{Realised, realise};
@@ -27,20 +27,31 @@ pub struct Design {
     pub sizing: Sizing,
     /// Frequency of the worst case.
     pub peak_frequency: RadiansPerSlowPeriod,
-    /// Number of Riccati equations solved, or of interior-point iterations.
-    pub iterations: usize,
-    /// For integer taps, the increase of the error that they cause.
-    pub words: Option<WordStudy>,
-    /// The result of the order reduction, if the spec asks for fewer states.
-    pub reduction: Option<OrderReduction>,
-    /// The comparison with a nominal bank, if the spec has an `[uncertainty]`.
-    pub robust: Option<RobustStudy>,
+    /// How the bank compares with others that the spec might have had.
+    pub study: Study,
     /// The bounds that the bank's proof proves, or the reason why the bank carries no proof.
     pub proof: Result<Verified, DesignError>,
     /// Why the proof does not cover the box of the spec's `[uncertainty]`, if it does not.
     pub box_unproven: Option<DesignError>,
     /// Time that the search for the proof took.
     pub proof_time: Duration,
+}
+
+/// How a bank compares with others, by the kind of its filters.
+#[derive(Debug, Clone)]
+pub enum Study {
+    /// Taps.
+    Fir {
+        /// With the real taps, if the spec asks for integer ones.
+        words: Option<WordStudy>,
+        /// With the bank that takes the errors for zero, if the spec has an `[uncertainty]`.
+        robust: Option<RobustStudy>,
+    },
+    /// A recursion.
+    Recursive {
+        /// With those of more and of fewer states, if the spec asks for fewer.
+        reduction: Option<OrderReduction>,
+    },
 }
 
 /// Whether [`design`] searches for a proof of the gammas. The search may take longer than the design.
@@ -55,7 +66,7 @@ pub enum ProofSearch {
 
 /// How a design runs.
 #[derive(Clone)]
-pub struct Options<'a> {
+pub struct DesignOptions<'a> {
     /// Whether a proof is searched.
     pub proof: ProofSearch,
     /// The time after which the design ends with what it has.
@@ -66,7 +77,7 @@ pub struct Options<'a> {
     pub stop: Stop,
 }
 
-impl Default for Options<'_> {
+impl Default for DesignOptions<'_> {
     /// With the search for a proof, limited to [`TIME_LIMIT`] and unobserved.
     fn default() -> Self {
         let (proof, time_limit, stop) = (ProofSearch::Run, Some(TIME_LIMIT), Stop::default());
@@ -74,7 +85,7 @@ impl Default for Options<'_> {
     }
 }
 
-impl Options<'_> {
+impl DesignOptions<'_> {
     /// The default without the search for a proof.
     pub fn without_proof() -> Self {
         Self { proof: ProofSearch::Skip, ..Self::default() }
@@ -83,9 +94,9 @@ impl Options<'_> {
 
 /// Designs the bank that `spec` asks for, with the proof of its gammas. `options` say how.
 ///
-/// A design that reaches its time limit or is ended by [`Options::stop`] gives the best bank so far, whose
-/// gamma may lie above the least; [`Design::proof`] is then [`DesignError::Stopped`]. It ends between two
-/// steps of its searches or two sample points of an interior-point method; a single equation or norm is
+/// A design that reaches its time limit or is ended by [`DesignOptions::stop`] gives the best bank so far,
+/// whose gamma may lie above the least; [`Design::proof`] is then [`DesignError::Stopped`]. It ends between
+/// two steps of its searches or two sample points of an interior-point method; a single equation or norm is
 /// computed to its end.
 ///
 /// # Errors
@@ -93,7 +104,7 @@ impl Options<'_> {
 /// end, a comparison method does not apply, no bank was found for numerical reasons, or the design was ended
 /// before there was one: [`DesignError::StoppedWithoutBank`]. A bank without a proof is not an error: see
 /// [`Design::proof`].
-pub fn design(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
+pub fn design(spec: &Spec, options: &DesignOptions<'_>) -> Result<Design, DesignError> {
     spec.check()?;
     designed(&filled_in(spec), options).map_err(|error| match error {
         DesignError::Stopped => DesignError::StoppedWithoutBank { remedy: remedy(spec) },
@@ -110,14 +121,14 @@ fn filled_in(spec: &Spec) -> Spec {
     filled
 }
 
-fn designed(spec: &Spec, options: &Options<'_>) -> Result<Design, DesignError> {
+fn designed(spec: &Spec, options: &DesignOptions<'_>) -> Result<Design, DesignError> {
     let stop = options.stop.within(options.time_limit);
     let problem = Problem::before_sizing(spec)?;
     let observer = |designs| (options.observer)(Stage::Latency { designs });
-    let sizing = Sizing::new(spec, &problem, Comparison { observer: &observer, stop: &stop })?;
+    let sizing = Sizing::new(spec, &problem, SizingControl { observer: &observer, stop: &stop })?;
     let problem = Problem { latency: sizing.latency, ..problem };
     (options.observer)(Stage::Filters);
-    let settings = Settings { stop: stop.clone(), ..settings(spec, sizing.taps)? };
+    let settings = MethodSettings { stop: stop.clone(), ..settings(spec, sizing.taps)? };
     let apart = settings.robust.is_some() || !settings.deviations.is_empty();
     let merged = merged(spec, &problem, apart)?;
     let plant = LiftedPlant::new(&merged.problem);
@@ -154,7 +165,7 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
     let synthesis = Synthesis::of_taps(&plant, taps.clone())?;
     let filters = SynthesisFilters::Fir(taps);
     let norm_error = plant.norm_error(synthesis.peak.gain, &filters::lifted(&filters, problem.ratio))?;
-    let realised = Realised { filters, peak: synthesis.peak, norm_error, reduction: None, integers: None };
+    let realised = Realised { norm_error, ..Realised::of(filters, synthesis.peak) };
     let sizing = Sizing { latency, taps: length, latency_chosen: false, taps_chosen: false };
     let judged = judge(&complete, sizing, realised, &synthesis).without_unresolved_bounds(&problem);
     Ok(judged.proved(search, &Stop::default()))
@@ -162,8 +173,7 @@ pub fn judge_taps(spec: &Spec, taps: Vec<Vec<f64>>, search: ProofSearch) -> Resu
 
 /// The bank with the norm of its final coefficients. No lower bound exceeds that norm.
 fn judge(spec: &Spec, sizing: Sizing, realised: Realised, synthesis: &Synthesis) -> Design {
-    let Realised { filters, peak, norm_error, reduction, integers } = realised;
-    let (fixed_point, words) = integers.unzip();
+    let Realised { filters, peak, norm_error, fixed_point, study } = realised;
     let bank = Bank {
         fast_period: spec.fast_period,
         ratio: spec.ratio,
@@ -182,10 +192,7 @@ fn judge(spec: &Spec, sizing: Sizing, realised: Realised, synthesis: &Synthesis)
     Design {
         sizing,
         peak_frequency: RadiansPerSlowPeriod(peak.frequency),
-        iterations: synthesis.iterations,
-        words,
-        reduction,
-        robust: synthesis.robust.clone(),
+        study,
         proof: Err(DesignError::ProofSkipped),
         box_unproven: None,
         proof_time: Duration::ZERO,
@@ -208,7 +215,7 @@ impl Design {
             let begin = Instant::now();
             self.proof = prove::attach_proof(&mut self.bank, stop);
             // `verify` proves the worst case only with the rest.
-            if self.proof.is_ok() && self.robust.is_some() {
+            if self.proof.is_ok() && matches!(self.study, Study::Fir { robust: Some(_), .. }) {
                 self.box_unproven = prove::attach_box_proof(&mut self.bank, stop).err();
             }
             self.proof_time = begin.elapsed();

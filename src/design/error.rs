@@ -1,6 +1,6 @@
 //! Errors of design and analysis.
 
-use super::length::Figure;
+use super::length::TargetFigure;
 use super::limits::{MAX_LONG_STATES, MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS};
 use crate::analog::AnalogError;
 use crate::linalg::LinalgError;
@@ -164,7 +164,7 @@ pub enum DesignError {
     )]
     FigureOutOfReach {
         /// Which.
-        figure: Figure,
+        figure: TargetFigure,
         /// Decibels.
         wanted: f64,
         /// The most that any number of taps reaches, in decibels.
@@ -179,7 +179,7 @@ pub enum DesignError {
     )]
     FigureMissed {
         /// Which.
-        figure: Figure,
+        figure: TargetFigure,
         /// Decibels.
         wanted: f64,
         /// The best of the lengths that were designed, in decibels.

@@ -5,10 +5,10 @@
 //! may peak between two uniform points.
 
 use super::DesignError;
-use super::filters;
 use super::plant::LiftedPlant;
-use crate::linalg::{self, CMat, Mat};
-use crate::lmi::sampled::{Point, Taps};
+use crate::linalg::{self, CMat};
+use crate::lmi::sampled::FrequencyPoint;
+use crate::lti::FirMatrix;
 use crate::lti::peak::{Peak, local_maxima, refine};
 use std::f64::consts::PI;
 use std::sync::OnceLock;
@@ -41,22 +41,22 @@ pub(super) trait AffineError {
     type Scenario: Clone + PartialEq + std::fmt::Debug;
 
     /// W and H at a location.
-    fn at(&self, location: &Location<Self::Scenario>) -> Point;
+    fn at(&self, location: &GridFrequency<Self::Scenario>) -> FrequencyPoint;
 
     /// The local maxima of `sigma_max(K)` over the frequencies for the unknowns `taps`, in any order. Those
     /// up to `level` may be left out.
-    fn peaks(&self, taps: &Taps, level: f64) -> Result<Vec<LocatedPeak<Self::Scenario>>, DesignError>;
+    fn peaks(&self, taps: &FirMatrix, level: f64) -> Result<Vec<LocatedPeak<Self::Scenario>>, DesignError>;
 }
 
 /// A frequency in one of the scenarios.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Location<S> {
+pub(super) struct GridFrequency<S> {
     /// Radians per lag.
     pub(super) frequency: f64,
     pub(super) scenario: S,
 }
 
-impl<S: PartialEq> Location<S> {
+impl<S: PartialEq> GridFrequency<S> {
     pub(super) fn is_near(&self, other: &Self) -> bool {
         (self.frequency - other.frequency).abs() <= LEAST_DISTANCE && self.scenario == other.scenario
     }
@@ -66,12 +66,12 @@ impl<S: PartialEq> Location<S> {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LocatedPeak<S> {
     pub(super) gain: f64,
-    pub(super) location: Location<S>,
+    pub(super) location: GridFrequency<S>,
 }
 
 impl From<Peak> for LocatedPeak<()> {
     fn from(Peak { gain, frequency }: Peak) -> Self {
-        Self { gain, location: Location { frequency, scenario: () } }
+        Self { gain, location: GridFrequency { frequency, scenario: () } }
     }
 }
 
@@ -84,7 +84,7 @@ fn coarse_intervals(lags: usize) -> usize {
 pub(super) struct ErrorGrid<'a> {
     plant: &'a LiftedPlant,
     frequencies: Frequencies,
-    points: Vec<OnceLock<Point>>,
+    points: Vec<OnceLock<FrequencyPoint>>,
 }
 
 /// Frequencies from 0 to pi.
@@ -131,12 +131,12 @@ impl<'a> ErrorGrid<'a> {
     }
 
     /// All points.
-    pub(super) fn points(&self) -> Vec<Point> {
+    pub(super) fn points(&self) -> Vec<FrequencyPoint> {
         (0..self.frequencies.all.len()).map(|k| self.point(k).clone()).collect()
     }
 
     /// The coarser points that suffice for a mean square, with their trapezoidal weights.
-    pub(super) fn coarse(&self) -> (Vec<Point>, Vec<f64>) {
+    pub(super) fn coarse(&self) -> (Vec<FrequencyPoint>, Vec<f64>) {
         let last = self.frequencies.uniform.len() / FINE;
         let at = |k: usize| self.point(self.frequencies.uniform[k * FINE]).clone();
         let mut weights = vec![1.0 / last as f64; last + 1];
@@ -145,13 +145,13 @@ impl<'a> ErrorGrid<'a> {
     }
 
     /// The gain of the error with `taps` at each point.
-    pub(super) fn gains(&self, taps: &[Mat]) -> Result<Vec<f64>, DesignError> {
+    pub(super) fn gains(&self, taps: &FirMatrix) -> Result<Vec<f64>, DesignError> {
         (0..self.frequencies.all.len()).map(|k| gain(&self.error(k, taps))).collect()
     }
 
     /// The mean square of the error per slow period, for white noise of unit density at the analog input, by
     /// the trapezoidal rule on the equidistant frequencies.
-    pub(super) fn mean_square(&self, taps: &[Mat]) -> f64 {
+    pub(super) fn mean_square(&self, taps: &FirMatrix) -> f64 {
         let weights = self.mean_weights();
         let square = |k: usize| weights[k] * self.error(k, taps).norm_squared();
         self.frequencies.uniform.iter().map(|&k| square(k)).sum()
@@ -172,26 +172,26 @@ impl<'a> ErrorGrid<'a> {
     ///
     /// # Errors
     /// [`DesignError::Linalg`] if a decomposition does not converge.
-    pub(super) fn gamma(&self, taps: &[Mat]) -> Result<f64, DesignError> {
+    pub(super) fn gamma(&self, taps: &FirMatrix) -> Result<f64, DesignError> {
         Ok(self.maxima(taps)?.iter().map(|peak| peak.gain).fold(0.0, f64::max))
     }
 
     /// The local maxima of the error with `taps`.
-    fn maxima(&self, taps: &[Mat]) -> Result<Vec<Peak>, DesignError> {
+    fn maxima(&self, taps: &FirMatrix) -> Result<Vec<Peak>, DesignError> {
         let grid = self.gains(taps)?.into_iter().zip(&self.frequencies.all);
         let grid: Vec<Peak> = grid.map(|(gain, &frequency)| Peak { gain, frequency }).collect();
         let at = |frequency: f64| {
-            let error = self.plant.at(frequency).error(&filters::response(taps, frequency));
+            let error = self.plant.at(frequency).error(&taps.response(frequency));
             Ok(Peak { gain: gain(&error)?, frequency })
         };
         local_maxima(&grid).into_iter().map(|around| refine(at, around, FLAT_GAIN)).collect()
     }
 
-    fn error(&self, k: usize, taps: &[Mat]) -> CMat {
-        self.point(k).error(&filters::response(taps, self.frequencies.all[k]))
+    fn error(&self, k: usize, taps: &FirMatrix) -> CMat {
+        self.point(k).error(&taps.response(self.frequencies.all[k]))
     }
 
-    fn point(&self, k: usize) -> &Point {
+    fn point(&self, k: usize) -> &FrequencyPoint {
         self.points[k].get_or_init(|| self.plant.at(self.frequencies.all[k]))
     }
 }
@@ -199,12 +199,12 @@ impl<'a> ErrorGrid<'a> {
 impl AffineError for ErrorGrid<'_> {
     type Scenario = ();
 
-    fn at(&self, location: &Location<()>) -> Point {
+    fn at(&self, location: &GridFrequency<()>) -> FrequencyPoint {
         self.plant.at(location.frequency)
     }
 
     /// All of them: the largest is compared with the norm, so it has to be one below the level too.
-    fn peaks(&self, taps: &Taps, _level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
+    fn peaks(&self, taps: &FirMatrix, _level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
         Ok(self.maxima(taps)?.into_iter().map(LocatedPeak::from).collect())
     }
 }

@@ -21,11 +21,12 @@
 //! exchange methods.
 
 use super::DesignError;
-use super::error_grid::{AffineError, Location};
+use super::error_grid::{AffineError, GridFrequency};
 use super::limits::Stop;
 use crate::linalg;
 use crate::lmi::FINEST_GAP;
-use crate::lmi::sampled::{self, LowerBound, MeanSquareObjective, Point, Problem, Taps};
+use crate::lmi::sampled::{self, FrequencyPoint, LowerBound, MeanSquareObjective, SampledProblem};
+use crate::lti::FirMatrix;
 
 /// Relative width of the interval `[lower, gamma]` at which the exchange ends.
 pub(crate) const GAMMA_ACCURACY: f64 = 5e-7;
@@ -83,18 +84,18 @@ impl Tolerances {
 
 /// Unknowns with what their error peaks at.
 #[derive(Debug, Clone)]
-pub(super) struct Candidate<S> {
+pub(super) struct TapCandidate<S> {
     /// `F_j`, M x N.
-    pub(super) taps: Taps,
+    pub(super) taps: FirMatrix,
     /// Estimate of their gamma; equal to gamma if no peak was missed.
     pub(super) estimate: f64,
     /// The locations of the peaks that belong among the points.
-    above: Vec<Location<S>>,
+    above: Vec<GridFrequency<S>>,
 }
 
 /// The solution on the points.
 struct Round<S> {
-    candidate: Candidate<S>,
+    candidate: TapCandidate<S>,
     is_solved: bool,
 }
 
@@ -104,9 +105,9 @@ pub(super) struct Exchange<E: AffineError> {
     /// The error that is minimised. The points stay when its scenarios are refined, so known ones must not
     /// change.
     pub(super) error: E,
-    problem: Problem,
+    problem: SampledProblem,
     /// Of the points of the problem, in the order in which they were added.
-    pub(super) locations: Vec<Location<E::Scenario>>,
+    pub(super) locations: Vec<GridFrequency<E::Scenario>>,
     /// Added points have the weight zero.
     objective: MeanSquareObjective,
     gamma_margin: f64,
@@ -118,8 +119,6 @@ pub(super) struct Exchange<E: AffineError> {
     pub(super) stop: Stop,
     /// Problems solved.
     pub(super) rounds: usize,
-    /// Interior-point iterations of all rounds.
-    pub(super) iterations: usize,
 }
 
 impl<E: AffineError> Exchange<E> {
@@ -128,14 +127,14 @@ impl<E: AffineError> Exchange<E> {
     /// [`LEAST_MARGIN`].
     pub(super) fn new(
         error: E,
-        problem: Problem,
+        problem: SampledProblem,
         scenarios: impl IntoIterator<Item = E::Scenario>,
         objective: MeanSquareObjective,
         gamma_margin: f64,
     ) -> Self {
         let frequencies = problem.points().iter().map(|point| point.omega);
         let located =
-            frequencies.zip(scenarios).map(|(frequency, scenario)| Location { frequency, scenario });
+            frequencies.zip(scenarios).map(|(frequency, scenario)| GridFrequency { frequency, scenario });
         let locations = located.collect();
         let gamma_margin = gamma_margin.max(LEAST_MARGIN);
         Self {
@@ -148,7 +147,6 @@ impl<E: AffineError> Exchange<E> {
             lower_for_all: 0.0,
             stop: Stop::default(),
             rounds: 0,
-            iterations: 0,
         }
     }
 
@@ -156,7 +154,7 @@ impl<E: AffineError> Exchange<E> {
     ///
     /// # Errors
     /// [`DesignError`] if a decomposition does not converge.
-    pub(super) fn optimise(&mut self) -> Result<Candidate<E::Scenario>, DesignError> {
+    pub(super) fn optimise(&mut self) -> Result<TapCandidate<E::Scenario>, DesignError> {
         self.optimise_at(Tolerances::steady(GAMMA_ACCURACY))
     }
 
@@ -167,14 +165,14 @@ impl<E: AffineError> Exchange<E> {
     pub(super) fn optimise_at(
         &mut self,
         tolerances: Tolerances,
-    ) -> Result<Candidate<E::Scenario>, DesignError> {
+    ) -> Result<TapCandidate<E::Scenario>, DesignError> {
         let least = self.minimise_gamma(tolerances)?;
         self.leave_out_inactive(&least, tolerances.active)?;
         self.minimise_mean_square(least, tolerances)
     }
 
     /// Adds points at the given locations, except where there is one. Returns whether any was added.
-    pub(super) fn add(&mut self, locations: &[Location<E::Scenario>]) -> bool {
+    pub(super) fn add(&mut self, locations: &[GridFrequency<E::Scenario>]) -> bool {
         let known = self.locations.len();
         for location in locations {
             if !self.locations.iter().any(|other| other.is_near(location)) {
@@ -182,13 +180,13 @@ impl<E: AffineError> Exchange<E> {
             }
         }
         let added = &self.locations[known..];
-        let points: Vec<Point> = added.iter().map(|location| self.error.at(location)).collect();
+        let points: Vec<FrequencyPoint> = added.iter().map(|location| self.error.at(location)).collect();
         self.objective.weights.extend(std::iter::repeat_n(0.0, added.len()));
         self.problem = self.problem.with_points(points);
         known < self.locations.len()
     }
 
-    fn minimise_gamma(&mut self, tolerances: Tolerances) -> Result<Candidate<E::Scenario>, DesignError> {
+    fn minimise_gamma(&mut self, tolerances: Tolerances) -> Result<TapCandidate<E::Scenario>, DesignError> {
         let mut tolerance = tolerances.tolerance(f64::INFINITY);
         let mut last = self.round(tolerances, tolerance)?;
         let mut best = last.candidate.clone();
@@ -216,7 +214,7 @@ impl<E: AffineError> Exchange<E> {
     /// Solves the problem on the points.
     fn round(&mut self, tolerances: Tolerances, tolerance: f64) -> Result<Round<E::Scenario>, DesignError> {
         let solution = sampled::minimise(&self.problem, tolerance, &|| self.stop.is_due())?;
-        self.count_round(solution.iterations);
+        self.rounds += 1;
         self.raise_lower_bound(solution.lower);
         // The optimum lies anywhere between the two.
         let optimum = if tolerance > tolerances.finest() { self.lower } else { solution.gamma };
@@ -227,7 +225,11 @@ impl<E: AffineError> Exchange<E> {
 
     /// Leaves out the added points where the gain of `start` is below a share of its gamma. If the secondary
     /// objective raises the gain there, it is a peak and becomes a point again.
-    fn leave_out_inactive(&mut self, start: &Candidate<E::Scenario>, share: f64) -> Result<(), DesignError> {
+    fn leave_out_inactive(
+        &mut self,
+        start: &TapCandidate<E::Scenario>,
+        share: f64,
+    ) -> Result<(), DesignError> {
         if share == 0.0 {
             return Ok(());
         }
@@ -244,7 +246,7 @@ impl<E: AffineError> Exchange<E> {
         }
         self.objective.weights = weights;
         self.locations = locations;
-        self.problem = Problem::new(points, self.problem.lags().to_vec());
+        self.problem = SampledProblem::new(points, self.problem.lags().to_vec());
         Ok(())
     }
 
@@ -252,9 +254,9 @@ impl<E: AffineError> Exchange<E> {
     /// `start` if the interior-point method makes no progress from there.
     fn minimise_mean_square(
         &mut self,
-        start: Candidate<E::Scenario>,
+        start: TapCandidate<E::Scenario>,
         tolerances: Tolerances,
-    ) -> Result<Candidate<E::Scenario>, DesignError> {
+    ) -> Result<TapCandidate<E::Scenario>, DesignError> {
         let cap = start.estimate * (1.0 + self.gamma_margin);
         let cap_at_points = start.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
         for _ in 0..tolerances.rounds {
@@ -271,7 +273,7 @@ impl<E: AffineError> Exchange<E> {
             )?;
             // Gamma may be zero up to rounding: no cap lies above it then, and no other unknowns are better.
             let Some(found) = found else { return Ok(start) };
-            self.count_round(found.iterations);
+            self.rounds += 1;
             let candidate = self.judge(found.taps, found.gamma, cap_at_points)?;
             if candidate.estimate <= cap {
                 return Ok(candidate);
@@ -285,11 +287,16 @@ impl<E: AffineError> Exchange<E> {
 
     /// The taps with the peaks of their error. None is searched once the design is stopped: `gamma`, that of
     /// the points, stands for them.
-    fn judge(&self, taps: Taps, gamma: f64, level: f64) -> Result<Candidate<E::Scenario>, DesignError> {
+    fn judge(
+        &self,
+        taps: FirMatrix,
+        gamma: f64,
+        level: f64,
+    ) -> Result<TapCandidate<E::Scenario>, DesignError> {
         let peaks = if self.stop.is_due() { Vec::new() } else { self.error.peaks(&taps, level)? };
         let estimate = peaks.iter().map(|peak| peak.gain).fold(gamma, f64::max);
         let above = peaks.into_iter().filter(|peak| peak.gain > level).map(|peak| peak.location).collect();
-        Ok(Candidate { taps, estimate, above })
+        Ok(TapCandidate { taps, estimate, above })
     }
 
     fn raise_lower_bound(&mut self, lower: LowerBound) {
@@ -297,11 +304,6 @@ impl<E: AffineError> Exchange<E> {
             self.lower_for_all = self.lower_for_all.max(lower.value);
         }
         self.lower = self.lower.max(lower.value);
-    }
-
-    fn count_round(&mut self, iterations: usize) {
-        self.rounds += 1;
-        self.iterations += iterations;
     }
 }
 

@@ -3,34 +3,30 @@
 use super::DesignError;
 use crate::bank::{self, Bank, SynthesisFilters};
 use crate::linalg::{CMat, Mat};
-use crate::lmi::sampled;
 use crate::lti::peak::{resonances, stable_poles};
-use crate::lti::{FrequencyResponse, StateSpace};
+use crate::lti::{FirMatrix, FrequencyResponse, StateSpace};
 use std::f64::consts::PI;
 
-/// The taps F_0, F_1, .. of F(z), M x N each, for filters `taps[i][n] = f_i[n]`; at least one.
-pub fn polyphase(taps: &[Vec<f64>], ratio: usize) -> Vec<Mat> {
-    let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap_or(0).max(1);
-    let tap = |i: usize, n: usize| taps[i].get(n).copied().unwrap_or(0.0);
-    (0..lags).map(|j| Mat::from_fn(ratio, taps.len(), |p, i| tap(i, p + j * ratio))).collect()
-}
+impl FirMatrix {
+    /// The polyphase components of filters `taps[i][n] = f_i[n]`.
+    pub fn polyphase(taps: &[Vec<f64>], ratio: usize) -> Self {
+        let lags = taps.iter().map(|f| f.len().div_ceil(ratio)).max().unwrap_or(0).max(1);
+        let tap = |i: usize, n: usize| taps[i].get(n).copied().unwrap_or(0.0);
+        (0..lags).map(|j| Mat::from_fn(ratio, taps.len(), |p, i| tap(i, p + j * ratio))).collect()
+    }
 
-/// The first `length` samples of each impulse response: the inverse of [`polyphase`].
-pub fn impulse_responses(lags: &[Mat], length: usize) -> Vec<Vec<f64>> {
-    let (ratio, channels) = lags.first().map_or((1, 0), Mat::shape);
-    (0..channels).map(|i| (0..length).map(|n| lags[n / ratio][(n % ratio, i)]).collect()).collect()
-}
-
-/// F at e^{jw}: the sum of e^{-jwj} F_j, w in radians per slow period.
-pub fn response(lags: &[Mat], w: f64) -> CMat {
-    let (rows, cols) = lags.first().map_or((0, 0), Mat::shape);
-    sampled::response(lags, w, rows, cols)
+    /// The first `length` samples of each impulse response: the inverse of [`polyphase`](Self::polyphase).
+    pub fn impulse_responses(&self, length: usize) -> Vec<Vec<f64>> {
+        let (ratio, channels) = self.shape();
+        let tap = |i: usize, n: usize| self.lags()[n / ratio][(n % ratio, i)];
+        (0..channels).map(|i| (0..length).map(|n| tap(i, n)).collect()).collect()
+    }
 }
 
 /// F of a bank, prepared for many frequencies.
 pub(crate) enum FilterResponse {
-    /// The lags F_0, F_1, ..
-    Polynomial(Vec<Mat>),
+    /// A polynomial in z^-1.
+    Polynomial(FirMatrix),
     /// A recursion, and the angles of its resonances.
     Recursive {
         /// F(z).
@@ -52,7 +48,7 @@ impl FilterResponse {
     /// [`DesignError::Lti`] for unstable filters.
     pub(crate) fn new(filters: &SynthesisFilters, ratio: usize) -> Result<Self, DesignError> {
         Ok(match filters {
-            SynthesisFilters::Fir(taps) => Self::Polynomial(polyphase(taps, ratio)),
+            SynthesisFilters::Fir(taps) => Self::Polynomial(FirMatrix::polyphase(taps, ratio)),
             SynthesisFilters::StateSpace(_) => {
                 let system = lifted(filters, ratio);
                 let resonances = resonances(&stable_poles(&system)?);
@@ -64,14 +60,14 @@ impl FilterResponse {
     /// F at e^{jw}, w in radians per slow period.
     pub(crate) fn at(&self, w: f64) -> CMat {
         match self {
-            Self::Polynomial(lags) => response(lags, w),
+            Self::Polynomial(fir) => fir.response(w),
             Self::Recursive { response, .. } => response.at_frequency(w),
         }
     }
 
     /// Slow periods after which the response to a sample is over, for FIR filters; 1 for a recursion.
     pub(crate) fn lags(&self) -> usize {
-        if let Self::Polynomial(lags) = self { lags.len() } else { 1 }
+        if let Self::Polynomial(fir) = self { fir.lags().len() } else { 1 }
     }
 
     /// Angles of the resonances of a recursion.
@@ -94,7 +90,7 @@ impl FilterResponse {
 /// For matrices that form no system: see [`Bank::check`].
 pub fn lifted(filters: &SynthesisFilters, ratio: usize) -> StateSpace {
     match filters {
-        SynthesisFilters::Fir(taps) => StateSpace::fir(&polyphase(taps, ratio)),
+        SynthesisFilters::Fir(taps) => FirMatrix::polyphase(taps, ratio).state_space(),
         SynthesisFilters::StateSpace(block) => from_block(block, ratio),
     }
 }
@@ -111,7 +107,7 @@ pub fn check_stable(bank: &Bank) -> Result<(), DesignError> {
     }
 }
 
-fn from_block(block: &bank::StateSpace, ratio: usize) -> StateSpace {
+fn from_block(block: &bank::StateMatrices, ratio: usize) -> StateSpace {
     let (n, channels) = (block.a.len(), block.d.first().map_or(0, Vec::len));
     let matrix = |rows: &[Vec<f64>], r: usize, c: usize| Mat::from_fn(r, c, |i, j| rows[i][j]);
     StateSpace::new(
@@ -123,9 +119,9 @@ fn from_block(block: &bank::StateSpace, ratio: usize) -> StateSpace {
 }
 
 /// A system as a bank holds it: lists of rows.
-pub fn to_block(system: &StateSpace) -> bank::StateSpace {
+pub fn to_block(system: &StateSpace) -> bank::StateMatrices {
     let rows = |m: &Mat| m.row_iter().map(|row| row.iter().copied().collect()).collect();
-    bank::StateSpace { a: rows(system.a()), b: rows(system.b()), c: rows(system.c()), d: rows(system.d()) }
+    bank::StateMatrices { a: rows(system.a()), b: rows(system.b()), c: rows(system.c()), d: rows(system.d()) }
 }
 
 #[cfg(test)]
@@ -135,13 +131,14 @@ mod tests {
     #[test]
     fn polyphase_components_are_the_samples_at_their_places() {
         let taps = vec![vec![1.0, 2.0, 3.0, 4.0, 5.0], vec![6.0]];
-        let lags = polyphase(&taps, 2);
+        let fir = FirMatrix::polyphase(&taps, 2);
+        let lags = fir.lags();
         assert_eq!(lags.len(), 3);
         assert_eq!(
             (lags[0][(1, 0)], lags[2][(0, 0)], lags[0][(0, 1)], lags[2][(1, 0)]),
             (2.0, 5.0, 6.0, 0.0)
         );
-        let back = impulse_responses(&lags, 5);
+        let back = fir.impulse_responses(5);
         assert_eq!(back, vec![vec![1.0, 2.0, 3.0, 4.0, 5.0], vec![6.0, 0.0, 0.0, 0.0, 0.0]]);
     }
 
@@ -169,7 +166,7 @@ mod tests {
 
     #[test]
     fn unstable_recursions_are_refused_and_fir_banks_never_are() {
-        let block = |pole: f64| bank::StateSpace {
+        let block = |pole: f64| bank::StateMatrices {
             a: vec![vec![pole]],
             b: vec![vec![1.0]],
             c: vec![vec![1.0]],

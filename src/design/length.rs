@@ -5,9 +5,9 @@ use super::deviations::Deviations;
 use super::figure_band::FigureBand;
 use super::fir_errors::{BankSize, FirErrors, candidates};
 use super::methods::robust_fir::robust_box;
-use super::methods::{self, Settings};
+use super::methods::{self, MethodSettings};
 use super::plant::LiftedPlant;
-use super::preparation::{Comparison, merged, settings, with_usual_noise};
+use super::preparation::{SizingControl, merged, settings, with_usual_noise};
 use super::problem::{Problem, common_delay};
 use super::tones::ToneResponse;
 use crate::bank::SynthesisFilters;
@@ -31,14 +31,14 @@ const LENGTHENINGS: usize = 16;
 /// A figure of a bank that a spec may ask for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Figure {
+pub enum TargetFigure {
     /// Power of the target over that of error and noise.
     Snr,
     /// Distance of the largest image of a tone.
     Sfdr,
 }
 
-impl fmt::Display for Figure {
+impl fmt::Display for TargetFigure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Snr => "SNR",
@@ -51,7 +51,7 @@ impl fmt::Display for Figure {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Goal {
     /// A figure of at least so many decibels.
-    AtLeast(Figure, f64),
+    AtLeast(TargetFigure, f64),
     /// The largest image of a bank that is made for samples without noise lies [`BELOW_NOISE_DB`] below the
     /// noise in the band; or more taps bring nothing.
     BelowNoise,
@@ -60,8 +60,8 @@ pub(super) enum Goal {
 impl Goal {
     /// What `spec` asks for.
     pub(super) fn of(spec: &Spec) -> Self {
-        let snr = spec.design.target_snr_db.map(|wanted| Self::AtLeast(Figure::Snr, wanted));
-        let sfdr = || spec.design.target_sfdr_db.map(|wanted| Self::AtLeast(Figure::Sfdr, wanted));
+        let snr = spec.design.target_snr_db.map(|wanted| Self::AtLeast(TargetFigure::Snr, wanted));
+        let sfdr = || spec.design.target_sfdr_db.map(|wanted| Self::AtLeast(TargetFigure::Sfdr, wanted));
         snr.or_else(sfdr).unwrap_or(Self::BelowNoise)
     }
 }
@@ -97,7 +97,7 @@ impl<'a> Lengths<'a> {
     ///
     /// # Errors
     /// [`DesignError::FigureOutOfReach`], [`DesignError::FigureMissed`], [`DesignError::Stopped`].
-    pub(super) fn fewest(&self, goal: Goal, comparison: Comparison<'_>) -> Result<BankSize, DesignError> {
+    pub(super) fn fewest(&self, goal: Goal, comparison: SizingControl<'_>) -> Result<BankSize, DesignError> {
         let size = self.fewest_of_least_squares(goal)?;
         let is_minimax = self.spec.design.method == Method::Fir && robust_box(self.spec).is_none();
         match goal {
@@ -145,9 +145,9 @@ impl<'a> Lengths<'a> {
     fn lengthened(
         &self,
         BankSize { mut taps, mut latency }: BankSize,
-        figure: Figure,
+        figure: TargetFigure,
         wanted: f64,
-        comparison: Comparison<'_>,
+        comparison: SizingControl<'_>,
     ) -> Result<BankSize, DesignError> {
         let most = MAX_OPTIMISED_TAPS / self.spec.layout().count();
         let mut best = f64::NEG_INFINITY;
@@ -157,7 +157,7 @@ impl<'a> Lengths<'a> {
                 latency = self.best(taps).latency;
             }
             comparison.after(designs)?;
-            let settings = Settings { stop: comparison.stop.clone(), ..settings(self.spec, taps)? };
+            let settings = MethodSettings { stop: comparison.stop.clone(), ..settings(self.spec, taps)? };
             let plant = LiftedPlant::new(&Problem { latency, ..self.problem.clone() });
             let synthesis = methods::synthesise(Method::Fir, &plant, &settings)?;
             comparison.go_on()?;
@@ -191,7 +191,7 @@ impl<'a> Lengths<'a> {
             Goal::AtLeast(figure, wanted) => (figure, wanted),
             Goal::BelowNoise => {
                 let noise = decibels(errors.zero_output() / errors.noise_of(&filters, &self.noise));
-                (Figure::Sfdr, noise + BELOW_NOISE_DB)
+                (TargetFigure::Sfdr, noise + BELOW_NOISE_DB)
             }
         };
         Ok(self.figure(errors, &filters, size.latency, figure)? >= wanted)
@@ -203,9 +203,9 @@ impl<'a> Lengths<'a> {
         errors: &FirErrors,
         filters: &[Vec<f64>],
         latency: usize,
-        figure: Figure,
+        figure: TargetFigure,
     ) -> Result<f64, DesignError> {
-        if figure == Figure::Snr {
+        if figure == TargetFigure::Snr {
             return Ok(decibels(errors.zero_output() / errors.square_of(filters, latency)));
         }
         let plain = Problem { latency, signal: None, ..self.problem.clone() };

@@ -35,7 +35,7 @@ pub(super) struct Lifted {
 
 /// What is sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Sample {
+struct SampledChannel {
     /// Index of the filter that is sampled.
     front_end: usize,
     /// The sample over that filter's output.
@@ -60,10 +60,10 @@ pub(super) fn lift(problem: &Problem) -> Lifted {
 }
 
 /// The samples of all outputs, the measurements first.
-fn samples(problem: &Problem, timeline: &Timeline) -> Vec<Sample> {
+fn samples(problem: &Problem, timeline: &Timeline) -> Vec<SampledChannel> {
     let measured = problem.channels.iter().map(|channel| (channel.front_end, channel.gain));
     let references = (0..problem.ratio).map(|_| (problem.target, 1.0));
-    let sample = |(index, (front_end, gain))| Sample { front_end, gain, instant: timeline.of(index) };
+    let sample = |(index, (front_end, gain))| SampledChannel { front_end, gain, instant: timeline.of(index) };
     measured.chain(references).enumerate().map(sample).collect()
 }
 
@@ -74,7 +74,7 @@ fn delays(timeline: &Timeline) -> Vec<usize> {
 
 /// Propagates the joint analog state through one period. The outputs of the returned system are the
 /// samples, without their delays by whole periods.
-fn follow_state(problem: &Problem, timeline: &Timeline, samples: &[Sample]) -> StateSpace {
+fn follow_state(problem: &Problem, timeline: &Timeline, samples: &[SampledChannel]) -> StateSpace {
     let joint = JointState::new(problem);
     let mut rows = vec![(Mat::zeros(1, 0), Mat::zeros(1, 0)); samples.len()];
     let mut state = Mat::identity(joint.order(), joint.order());

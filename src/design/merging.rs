@@ -47,12 +47,12 @@ pub(super) struct MergedChannels {
     /// The problem with each distinct channel once.
     pub(super) problem: Problem,
     /// One for each of the original channels.
-    pub(super) shares: Vec<Share>,
+    pub(super) shares: Vec<MergedShare>,
 }
 
 /// The merged channel to which a channel belongs, and its weight there.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Share {
+pub(super) struct MergedShare {
     /// Index of the merged channel.
     pub(super) representative: usize,
     /// The merged measurement is the sum of the measurements times their shares. Zero for a channel that
@@ -67,7 +67,7 @@ impl Problem {
         let mut merged = self.clone();
         merged.channels.clear();
         merged.noise.clear();
-        let mut shares = vec![Share { representative: 0, share: 0.0 }; self.channels.len()];
+        let mut shares = vec![MergedShare { representative: 0, share: 0.0 }; self.channels.len()];
         for group in self.groups(repeats) {
             let newest = self.newest(&group);
             let reference = self.channels[newest[0]];
@@ -161,14 +161,14 @@ impl MergedChannels {
 
     /// Whether the channels are the original ones, in their units.
     pub(super) fn are_unchanged(&self) -> bool {
-        let unchanged = |(i, share): (usize, &Share)| share.representative == i && share.share == 1.0;
+        let unchanged = |(i, share): (usize, &MergedShare)| share.representative == i && share.share == 1.0;
         self.shares.iter().enumerate().all(unchanged)
     }
 
     /// For each merged channel the first of the original channels whose sample is the newest.
     pub(super) fn representatives(&self) -> Vec<usize> {
         let of = |merged: usize| {
-            let belongs = |share: &Share| share.representative == merged && share.share != 0.0;
+            let belongs = |share: &MergedShare| share.representative == merged && share.share != 0.0;
             self.shares.iter().position(belongs)
         };
         (0..self.problem.channels.len()).filter_map(of).collect()
@@ -177,7 +177,8 @@ impl MergedChannels {
     /// Distributes each merged filter over its channels by their shares. The error stays the same, and the
     /// noise is least.
     pub(super) fn share_taps(&self, taps: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let share = |part: &Share| taps[part.representative].iter().map(|tap| tap * part.share).collect();
+        let share =
+            |part: &MergedShare| taps[part.representative].iter().map(|tap| tap * part.share).collect();
         self.shares.iter().map(share).collect()
     }
 

@@ -40,12 +40,12 @@ pub use analysis::{
     Analysis, GammaScale, MeanAnalysis, analyze, analyze_mean, delay_point, noise_gain, norm_at,
 };
 pub(crate) use analysis::{NearestSample, nearest_samples};
-pub use designer::{Design, Options, ProofSearch, design, judge_taps};
+pub use designer::{Design, DesignOptions, ProofSearch, Study, design, judge_taps};
 pub(crate) use deviations::Deviations;
 pub use error::DesignError;
 pub use figure_band::{BandSource, FigureBand};
 pub use known_instants::instants_estimator;
-pub use length::Figure;
+pub use length::TargetFigure;
 pub use limits::{Stage, Stop, TIME_LIMIT, remedy};
 pub use methods::robust_fir::{RobustNorms, RobustStudy};
 pub use missing::MissingSamples;
@@ -54,9 +54,9 @@ pub use problem::Problem;
 pub use prove::certify;
 pub use reduction::{OrderErrorPoint, OrderReduction};
 pub use responses::error_response;
-pub(crate) use signal::{Columns, Signal};
+pub(crate) use signal::{AliasColumns, SampledSignal};
 pub use sizing::Sizing;
-pub use tones::Tone;
+pub use tones::ToneOutput;
 pub(crate) use tones::{ToneResponse, Worst};
 pub use warnings::warnings;
 

@@ -8,12 +8,12 @@ use super::merging::Repeats;
 use super::problem::Problem;
 use crate::bank::{Gamma, SynthesisFilters};
 use crate::linalg::{self, CMat, Complex, Mat};
-use crate::lmi::sampled::Point;
+use crate::lmi::sampled::FrequencyPoint;
 use crate::lti::gramian::h2_norm;
 use crate::lti::peak::{
     Peak, hinf_norm, hinf_norm_with_response, resonances, stable_poles, unexplained_peak,
 };
-use crate::lti::{FrequencyResponse, StateSpace};
+use crate::lti::{FirMatrix, FrequencyResponse, StateSpace};
 use std::f64::consts::PI;
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -162,10 +162,10 @@ impl LiftedPlant {
 
     /// H and W at e^{j omega}, omega in radians per slow period. The columns are compressed to at
     /// most N + M, which keeps `[H; W] [H; W]*`.
-    pub fn at(&self, omega: f64) -> Point {
+    pub fn at(&self, omega: f64) -> FrequencyPoint {
         let g = linalg::lq_factor(&self.at_frequency(omega));
         let (n, m) = (self.channels(), self.ratio());
-        Point { omega, h: g.rows(0, n).into_owned(), w: g.rows(n, m).into_owned() }
+        FrequencyPoint { omega, h: g.rows(0, n).into_owned(), w: g.rows(n, m).into_owned() }
     }
 
     /// ||K|| with the frequency at which it is attained, radians per slow period.
@@ -188,27 +188,28 @@ impl LiftedPlant {
     /// # Panics
     /// Unless there is a filter for each channel.
     pub fn fir_norm(&self, taps: &[Vec<f64>]) -> Result<Peak, DesignError> {
-        let lags = filters::polyphase(taps, self.ratio());
-        let system = self.error_system(&self.delay_lines(&lags, &self.problem.measurement_units()?));
+        let fir = FirMatrix::polyphase(taps, self.ratio());
+        let system = self.error_system(&self.delay_lines(&fir, &self.problem.measurement_units()?));
         let (n, m) = (self.channels(), self.ratio());
         let response = |w: f64| {
             let g = self.at_frequency(w);
-            g.rows(n, m) - filters::response(&lags, w) * g.rows(0, n)
+            g.rows(n, m) - fir.response(w) * g.rows(0, n)
         };
         // Between 0 and pi a polynomial in e^{-jw} has at most one peak per lag.
-        let grid = FREQUENCIES_PER_LAG * lags.len();
+        let grid = FREQUENCIES_PER_LAG * fir.lags().len();
         let mut initial = self.resonances()?;
         initial.extend((1..grid).map(|k| PI * k as f64 / grid as f64));
         Ok(hinf_norm_with_response(&system, &response, initial)?)
     }
 
     /// FIR filters whose delay lines hold measurements of about unit size, each in its unit.
-    fn delay_lines(&self, lags: &[Mat], units: &[f64]) -> StateSpace {
-        let mut of_unit_size = lags.to_vec();
-        for lag in &mut of_unit_size {
+    fn delay_lines(&self, fir: &FirMatrix, units: &[f64]) -> StateSpace {
+        let of_unit_size = |lag: &Mat| {
+            let mut lag = lag.clone();
             lag.column_iter_mut().zip(units).for_each(|(mut column, unit)| column.unscale_mut(*unit));
-        }
-        StateSpace::fir(&of_unit_size).scale_inputs(units)
+            lag
+        };
+        fir.lags().iter().map(of_unit_size).collect::<FirMatrix>().state_space().scale_inputs(units)
     }
 
     /// ||K|| of a bank's filters, computed from the coefficients in the bank.

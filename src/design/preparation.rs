@@ -4,7 +4,7 @@ use super::DesignError;
 use super::deviations::Deviations;
 use super::limits::Stop;
 use super::merging::{MergedChannels, Repeats};
-use super::methods::Settings;
+use super::methods::MethodSettings;
 use super::methods::robust_fir::robust_box;
 use super::problem::{Problem, common_delay};
 use crate::analog::SignalFilter;
@@ -15,14 +15,14 @@ const USUAL_BITS: u32 = 16;
 
 /// What follows the designs that a choice compares, and ends them.
 #[derive(Clone, Copy)]
-pub(super) struct Comparison<'a> {
+pub(super) struct SizingControl<'a> {
     /// Called with the number of designs that were compared.
     pub(super) observer: &'a dyn Fn(usize),
     /// When to end.
     pub(super) stop: &'a Stop,
 }
 
-impl Comparison<'_> {
+impl SizingControl<'_> {
     /// So many designs were compared, and another one begins.
     pub(super) fn after(self, designs: usize) -> Result<(), DesignError> {
         (self.observer)(designs);
@@ -39,7 +39,7 @@ impl Comparison<'_> {
 ///
 /// # Errors
 /// [`DesignError`] if the spec has no [`Problem`] at the slow rate.
-pub(super) fn settings(spec: &Spec, taps: usize) -> Result<Settings, DesignError> {
+pub(super) fn settings(spec: &Spec, taps: usize) -> Result<MethodSettings, DesignError> {
     let at_slow_rate = || {
         let signal = SignalFilter::written_out(spec);
         let slow = Spec { fast_period: spec.fast_period * spec.ratio as f64, signal, ..spec.per_sample() };
@@ -48,13 +48,13 @@ pub(super) fn settings(spec: &Spec, taps: usize) -> Result<Settings, DesignError
         Ok::<_, DesignError>(problem.merge_channels(Repeats::AtOneInstant).of_unit_size()?.problem)
     };
     let separate = spec.design.method == Method::Separation;
-    Ok(Settings {
+    Ok(MethodSettings {
         taps,
         robust: robust_box(spec),
         deviations: if spec.design.method == Method::H2 { Deviations::uncertain(spec) } else { Vec::new() },
         gamma_margin: spec.design.gamma_margin,
         at_slow_rate: separate.then(at_slow_rate).transpose()?,
-        ..Settings::default()
+        ..MethodSettings::default()
     })
 }
 

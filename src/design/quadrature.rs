@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 /// An angle theta with its share of a mean over 0 to pi.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Node {
+pub(super) struct QuadratureNode {
     pub(super) theta: f64,
     pub(super) share: f64,
 }
@@ -24,7 +24,7 @@ pub(super) struct Integrand<'a> {
 impl Integrand<'_> {
     /// The nodes of panels of eight points each. Over a panel nothing oscillates by more than a cycle, and
     /// no pole is nearer than its width: the rule errs by 1e-10.
-    pub(super) fn nodes(&self) -> Vec<Node> {
+    pub(super) fn nodes(&self) -> Vec<QuadratureNode> {
         let mut ends: Vec<f64> =
             self.breaks.iter().copied().filter(|end| *end > 0.0 && *end < PI).chain([0.0, PI]).collect();
         ends.sort_by(f64::total_cmp);
@@ -33,17 +33,17 @@ impl Integrand<'_> {
         nodes
     }
 
-    fn add_panels(&self, low: f64, high: f64, nodes: &mut Vec<Node>) {
+    fn add_panels(&self, low: f64, high: f64, nodes: &mut Vec<QuadratureNode>) {
         let width = high - low;
         if width > self.widest(low, high) {
             let middle = 0.5 * (low + high);
             self.add_panels(low, middle, nodes);
             self.add_panels(middle, high, nodes);
         } else if width > 0.0 {
-            nodes.extend(
-                GAUSS_LEGENDRE
-                    .map(|(part, share)| Node { theta: low + part * width, share: share * width / PI }),
-            );
+            nodes.extend(GAUSS_LEGENDRE.map(|(part, share)| QuadratureNode {
+                theta: low + part * width,
+                share: share * width / PI,
+            }));
         }
     }
 

@@ -2,13 +2,14 @@
 //! reduces the order or quantises the taps if the spec asks for it, and chooses the realisation that runs
 //! fastest.
 
+use super::designer::Study;
 use super::limits::Stop;
 use super::merging::{MergedChannels, Repeats};
 use super::methods::Synthesis;
 use super::plant::LiftedPlant;
 use super::problem::Problem;
-use super::quantise::{Allowance, QuantisationProblem, WordStudy, quantise, quantise_within};
-use super::reduction::{Aim, OrderReduction, ReductionProblem, reduce};
+use super::quantise::{Allowance, QuantisationProblem, quantise, quantise_within};
+use super::reduction::{Aim, ReductionProblem, reduce};
 use super::{DesignError, filters};
 use crate::bank::{FixedPoint, SynthesisFilters};
 use crate::lti::peak::Peak;
@@ -25,14 +26,19 @@ pub(super) struct Realised {
     pub(super) peak: Peak,
     /// The absolute error that `peak.gain` may have.
     pub(super) norm_error: f64,
-    pub(super) reduction: Option<OrderReduction>,
-    pub(super) integers: Option<(FixedPoint, WordStudy)>,
+    /// For integer taps.
+    pub(super) fixed_point: Option<FixedPoint>,
+    pub(super) study: Study,
 }
 
 impl Realised {
     /// Filters of which only the norm of the error system is known.
-    fn of(filters: SynthesisFilters, peak: Peak) -> Self {
-        Self { filters, peak, norm_error: 0.0, reduction: None, integers: None }
+    pub(super) fn of(filters: SynthesisFilters, peak: Peak) -> Self {
+        let study = match filters {
+            SynthesisFilters::Fir(_) => Study::Fir { words: None, robust: None },
+            SynthesisFilters::StateSpace(_) => Study::Recursive { reduction: None },
+        };
+        Self { filters, peak, norm_error: 0.0, fixed_point: None, study }
     }
 }
 
@@ -50,9 +56,9 @@ pub(super) fn realise(
     stop: &Stop,
 ) -> Result<Realised, DesignError> {
     let whole = if merged.are_unchanged() { merged_plant.clone() } else { LiftedPlant::new(problem) };
-    let realisation = Realisation { spec, problem, whole: &whole, merged, stop };
+    let realisation = FilterRealisation { spec, problem, whole: &whole, merged, stop };
     let realised = match &synthesis.filters {
-        SynthesisFilters::Fir(taps) => realisation.with_integers(realisation.fir(taps, synthesis.peak)?),
+        SynthesisFilters::Fir(taps) => realisation.fir(taps, synthesis),
         recursion => realisation.state_space(&filters::lifted(recursion, spec.ratio), synthesis.peak.gain),
     }?;
     let lifted = filters::lifted(&realised.filters, spec.ratio);
@@ -60,7 +66,7 @@ pub(super) fn realise(
     Ok(Realised { norm_error, ..realised })
 }
 
-struct Realisation<'a> {
+struct FilterRealisation<'a> {
     spec: &'a Spec,
     /// All channels.
     problem: &'a Problem,
@@ -71,36 +77,35 @@ struct Realisation<'a> {
     stop: &'a Stop,
 }
 
-impl Realisation<'_> {
-    fn fir(&self, taps: &[Vec<f64>], peak: Peak) -> Result<Realised, DesignError> {
-        if self.merged.are_unchanged() {
-            return Ok(Realised::of(SynthesisFilters::Fir(taps.to_vec()), peak));
-        }
-        evaluate(self.whole, SynthesisFilters::Fir(self.merged.share_taps(taps)))
-    }
-
-    /// Quantises the taps if the spec asks for integer taps.
-    fn with_integers(&self, real: Realised) -> Result<Realised, DesignError> {
+impl FilterRealisation<'_> {
+    /// The taps of all channels, quantised if the spec asks for integer taps.
+    fn fir(&self, merged: &[Vec<f64>], synthesis: &Synthesis) -> Result<Realised, DesignError> {
         let design = &self.spec.design;
-        let SynthesisFilters::Fir(taps) = &real.filters else { return Ok(real) };
+        let taps = self.merged.share_taps(merged);
+        let peak = if self.merged.are_unchanged() { synthesis.peak } else { self.whole.fir_norm(&taps)? };
+        let robust = synthesis.robust.clone();
         let problem = QuantisationProblem {
             plant: self.whole,
-            taps,
+            taps: &taps,
             noise: &self.whole.problem().noise,
             gamma_margin: design.gamma_margin.unwrap_or(0.0),
             stop: self.stop,
         };
-        let gamma = real.peak.gain;
-        let (integers, study) = match (&design.bits, design.loss_db) {
+        let gamma = peak.gain;
+        let (integers, words) = match (&design.bits, design.loss_db) {
             (bits, Some(loss_db)) => {
                 let most = bits.clone().unwrap_or(WordLengths::Same(MAX_BITS));
                 quantise_within(problem, gamma, &Allowance { loss_db, most })?
             }
             (Some(bits), None) => quantise(problem, gamma, bits, design.fraction_bits)?,
-            (None, None) => return Ok(real),
+            (None, None) => {
+                let study = Study::Fir { words: None, robust };
+                return Ok(Realised { study, ..Realised::of(SynthesisFilters::Fir(taps), peak) });
+            }
         };
         let evaluated = evaluate(self.whole, SynthesisFilters::Fir(integers.taps()))?;
-        Ok(Realised { integers: Some((integers, study)), ..evaluated })
+        let study = Study::Fir { words: Some(words), robust };
+        Ok(Realised { fixed_point: Some(integers), study, ..evaluated })
     }
 
     /// A recursive bank of the order that the spec asks for; `norm` is the norm of the error of `system`
@@ -132,7 +137,7 @@ impl Realisation<'_> {
                 self.fastest_realisation(&whole, record.reduced.figures.gamma)?
             }
         };
-        Ok(Realised { reduction: Some(record), ..evaluated })
+        Ok(Realised { study: Study::Recursive { reduction: Some(record) }, ..evaluated })
     }
 
     /// The filters in the cheapest realisation that keeps the norm `promised`: an FIR head followed by

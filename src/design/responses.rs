@@ -4,7 +4,8 @@
 use super::problem::{Channel, Problem};
 use super::{DesignError, LiftedPlant, filters};
 use crate::bank::{Bank, SynthesisFilters};
-use crate::linalg::{self, Complex, Mat};
+use crate::linalg::{self, Complex};
+use crate::lti::FirMatrix;
 use crate::units::{GridTime, Hertz, RadiansPerFastPeriod, RadiansPerSlowPeriod};
 use std::f64::consts::PI;
 
@@ -16,15 +17,15 @@ const MOST_PERIODS: usize = 4096;
 /// The impulse responses `f_i[n]` of the synthesis filters at the fast rate, all of one length. That of a
 /// recursive filter ends where 1e-12 of its energy is left, or after 4,096 slow periods.
 pub fn impulse_responses(bank: &Bank) -> Vec<Vec<f64>> {
-    let lags = match &bank.filters {
+    let fir = match &bank.filters {
         SynthesisFilters::Fir(taps) => return taps.clone(),
         SynthesisFilters::StateSpace(_) => lags_of_recursion(bank),
     };
-    filters::impulse_responses(&lags, lags.len() * bank.ratio)
+    fir.impulse_responses(fir.lags().len() * bank.ratio)
 }
 
 /// F_0 = D, F_j = C A^(j-1) B.
-fn lags_of_recursion(bank: &Bank) -> Vec<Mat> {
+fn lags_of_recursion(bank: &Bank) -> FirMatrix {
     let system = filters::lifted(&bank.filters, bank.ratio);
     let mut lags = vec![system.d().clone()];
     let mut state = system.b().clone();
@@ -43,7 +44,7 @@ fn lags_of_recursion(bank: &Bank) -> Vec<Mat> {
     });
     let kept = lags.len() - tail.count();
     lags.truncate(kept.max(1));
-    lags
+    FirMatrix::new(lags)
 }
 
 /// `F(e^{j w}) = sum_n f[n] e^{-j w n}` and its group delay, `-d arg F / d w`, in fast samples.
@@ -123,7 +124,7 @@ pub fn error_response(bank: &Bank, points: usize) -> Result<Vec<(Hertz, f64)>, D
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bank::StateSpace;
+    use crate::bank::StateMatrices;
     use std::f64::consts::TAU;
 
     /// The sum over 20,000 aliases on either side; the rest is below (0.5 / (2 pi 20,000))^3.
@@ -133,7 +134,7 @@ mod tests {
              channel = [{ delay = 0.6, gain = -2.0 }, { delay = 0.1 }]\n\
              target = { filter = { num = [1.0], den = [1.0, 2.0, 1.0] } }\ndesign = { method = \"sinc\", taps = 4 }";
         let spec = crate::spec::Spec::from_toml(text, "spec.toml").unwrap();
-        let bank = crate::design::design(&spec, &crate::design::Options::without_proof()).unwrap().bank;
+        let bank = crate::design::design(&spec, &crate::design::DesignOptions::without_proof()).unwrap().bank;
         let frequencies = [0.0, 0.25, 0.5, 0.75, 1.0].map(Hertz);
         for (hertz, gains) in frequencies.iter().zip(analysis_gains(&bank, &frequencies).unwrap()) {
             // h = 0.5: 1 / (s + 1)^2 is 0.25 / (s + 0.5)^2 in fast periods.
@@ -149,7 +150,7 @@ mod tests {
     #[test]
     fn a_recursion_has_the_impulse_response_of_its_closed_form() {
         // y[k] = sum_j 0.5^j x[k - j] at phase 0, the input itself at phase 1.
-        let block = StateSpace {
+        let block = StateMatrices {
             a: vec![vec![0.5]],
             b: vec![vec![0.5]],
             c: vec![vec![1.0], vec![0.0]],

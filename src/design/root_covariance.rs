@@ -16,8 +16,8 @@
 
 use super::deviations::Deviations;
 use super::problem::Problem;
-use super::quadrature::{Integrand, Node};
-use super::signal::Signal;
+use super::quadrature::{Integrand, QuadratureNode};
+use super::signal::SampledSignal;
 use crate::linalg::{self, CMat, Complex, Mat};
 use std::ops::RangeInclusive;
 
@@ -52,7 +52,7 @@ impl RootCovariance {
         instants: RangeInclusive<i64>,
     ) -> Self {
         let problem = Problem { latency: 0, ..problem.clone() };
-        let signal = Signal::of(&problem);
+        let signal = SampledSignal::of(&problem);
         let nodes = integrand(&problem, &signal, frames, &instants);
         let mut columns = RootColumns::new(&problem, frames, instants.clone());
         for node in nodes {
@@ -117,7 +117,7 @@ pub(super) struct PartialHistory<'a> {
 
 /// An estimate from known samples.
 #[derive(Debug)]
-pub(super) struct Estimate {
+pub(super) struct Projection {
     /// The weights of the known samples.
     pub(super) weights: Vec<f64>,
     /// The mean square of its error.
@@ -126,13 +126,13 @@ pub(super) struct Estimate {
 
 impl PartialHistory<'_> {
     /// The estimate of a sample of the history.
-    pub(super) fn sample(&self, place: usize) -> Estimate {
+    pub(super) fn sample(&self, place: usize) -> Projection {
         let own = self.whole.samples.row(place);
         let projection = own * self.basis.transpose();
         let error = (own - &projection * &self.basis).norm_squared();
         // Every sample has noise, so none of the known ones follows from the others.
         let weights = self.samples.tr_solve_lower_triangular(&projection.transpose());
-        Estimate { weights: weights.map_or_else(Vec::new, |weights| weights.as_slice().to_vec()), error }
+        Projection { weights: weights.map_or_else(Vec::new, |weights| weights.as_slice().to_vec()), error }
     }
 
     /// The error of the estimate of the target at `instant`.
@@ -144,7 +144,12 @@ impl PartialHistory<'_> {
     }
 }
 
-fn integrand(problem: &Problem, signal: &Signal, frames: usize, instants: &RangeInclusive<i64>) -> Vec<Node> {
+fn integrand(
+    problem: &Problem,
+    signal: &SampledSignal,
+    frames: usize,
+    instants: &RangeInclusive<i64>,
+) -> Vec<QuadratureNode> {
     let ratio = problem.ratio as f64;
     let oldest = -problem.longest_delay().0 - frames as f64 * ratio;
     let reach = (*instants.end() as f64).max(0.0) - oldest.min(*instants.start() as f64);
@@ -180,7 +185,7 @@ impl RootColumns {
 
     /// Adds what the signal gives at a node. An LQ factorisation leaves the samples no more columns than
     /// channels.
-    fn add(&mut self, signal: &Signal, deviations: &[Deviations], node: Node) {
+    fn add(&mut self, signal: &SampledSignal, deviations: &[Deviations], node: QuadratureNode) {
         let columns = signal.at(node.theta).with_errors(signal.problem(), deviations);
         let channels = self.sizes.len();
         let stacked =

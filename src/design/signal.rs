@@ -24,7 +24,7 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// A signal that reaches the samples of a problem.
 #[derive(Debug, Clone)]
-pub(crate) struct Signal {
+pub(crate) struct SampledSignal {
     problem: Problem,
     /// The frequencies that it occupies with unit density, radians per fast period. `None`: all.
     band: Option<RangeInclusive<f64>>,
@@ -50,7 +50,7 @@ struct Alias {
 /// The mean over theta of `|reference - F measurement|^2 / M` (Frobenius) is the mean square of the error of
 /// the filters F per fast sample.
 #[derive(Debug, Clone)]
-pub(crate) struct Columns {
+pub(crate) struct AliasColumns {
     /// w of each column, radians per fast period.
     pub(crate) frequencies: Vec<f64>,
     /// N rows.
@@ -59,7 +59,7 @@ pub(crate) struct Columns {
     pub(crate) reference: CMat,
 }
 
-impl Signal {
+impl SampledSignal {
     /// That of `problem`: white noise of unit density in its band, or through the filter of its signal at
     /// all frequencies.
     pub(crate) fn of(problem: &Problem) -> Self {
@@ -101,7 +101,7 @@ impl Signal {
     }
 
     /// The columns at theta, radians per slow period.
-    pub(crate) fn at(&self, theta: f64) -> Columns {
+    pub(crate) fn at(&self, theta: f64) -> AliasColumns {
         let Problem { ratio, latency, front_ends, target, channels, .. } = &self.problem;
         let filters = 0..front_ends.len();
         let period = *ratio as f64;
@@ -126,11 +126,11 @@ impl Signal {
                 reference[(p, k)] = passed[*target] * Complex::from_polar(1.0, advance);
             }
         }
-        Columns { frequencies, measurement, reference }
+        AliasColumns { frequencies, measurement, reference }
     }
 }
 
-impl Columns {
+impl AliasColumns {
     /// The mean over errors of the converters, and beside it columns that the samples of one converter alone
     /// have: the mean square over all columns is that over the errors. A delay shared by the samples of a
     /// converter changes nothing between them.

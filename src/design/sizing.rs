@@ -14,9 +14,9 @@ use super::fir_errors::{BankSize, check_reach};
 use super::length::{Goal, Lengths};
 use super::limits::Stop;
 use super::merging::Repeats;
-use super::methods::{self, Settings};
+use super::methods::{self, MethodSettings};
 use super::plant::LiftedPlant;
-use super::preparation::{Comparison, settings, with_usual_noise};
+use super::preparation::{SizingControl, settings, with_usual_noise};
 use super::problem::{Problem, common_delay};
 use super::realise::realise;
 use crate::bank::SynthesisFilters;
@@ -47,7 +47,7 @@ impl Sizing {
     /// # Errors
     /// As [`design`](super::design).
     pub fn of(spec: &Spec) -> Result<Self, DesignError> {
-        let comparison = Comparison { observer: &|_| (), stop: &Stop::default() };
+        let comparison = SizingControl { observer: &|_| (), stop: &Stop::default() };
         Self::new(spec, &Problem::before_sizing(spec)?, comparison)
     }
 
@@ -60,7 +60,7 @@ impl Sizing {
     pub(super) fn new(
         spec: &Spec,
         problem: &Problem,
-        comparison: Comparison<'_>,
+        comparison: SizingControl<'_>,
     ) -> Result<Self, DesignError> {
         let taps = spec.design.taps.or(usual_taps(spec));
         let BankSize { taps, latency } = match (taps, spec.latency) {
@@ -99,7 +99,7 @@ fn choose(
     spec: &Spec,
     taps: Option<usize>,
     problem: &Problem,
-    comparison: Comparison<'_>,
+    comparison: SizingControl<'_>,
 ) -> Result<BankSize, DesignError> {
     comparison.after(0)?;
     // Delays that all channels have only add to the latency.
@@ -122,7 +122,11 @@ fn choose(
 }
 
 /// The latency of a recursive bank.
-fn causal_latency(spec: &Spec, problem: Problem, comparison: Comparison<'_>) -> Result<usize, DesignError> {
+fn causal_latency(
+    spec: &Spec,
+    problem: Problem,
+    comparison: SizingControl<'_>,
+) -> Result<usize, DesignError> {
     let whole = Problem { noise: problem.noise_powers(&with_usual_noise(spec))?, ..problem };
     let merged = whole.merge_channels(Repeats::of(spec)).of_unit_size()?;
     let errors = CausalErrors::new(&merged.problem)?;
@@ -150,7 +154,7 @@ fn latency_of_order(
     spec: &Spec,
     problem: &Problem,
     errors: &CausalErrors,
-    comparison: Comparison<'_>,
+    comparison: SizingControl<'_>,
 ) -> Result<usize, DesignError> {
     let first = errors.shortest();
     let mut tried = Tried { errors: vec![f64::INFINITY; errors.longest() + 1], best: first, refused: None };
@@ -218,7 +222,7 @@ fn error_of_order(spec: &Spec, problem: &Problem, stop: &Stop) -> Result<f64, De
     spec.design.method = Method::H2;
     let merged = problem.merge_channels(Repeats::of(&spec)).of_unit_size()?;
     let plant = LiftedPlant::new(&merged.problem);
-    let settings = Settings { stop: stop.clone(), ..settings(&spec, 0)? };
+    let settings = MethodSettings { stop: stop.clone(), ..settings(&spec, 0)? };
     let synthesis = methods::synthesise(Method::H2, &plant, &settings)?;
     let realised = realise(&spec, problem, &merged, &plant, &synthesis, stop)?;
     whole_error(&LiftedPlant::new(problem), &realised.filters)

@@ -35,7 +35,7 @@ const VANISHING: f64 = 1e-6;
 /// is the amplitude at w + 2 pi k / M: the tone for k = 0, an image for k = 1 .. M - 1. Where delays or
 /// gains are uncertain, the figures are root mean squares over their errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tone {
+pub struct ToneOutput {
     /// w / (2 pi).
     pub frequency: CyclesPerFastPeriod,
     /// |Phi_0(j w)|, the gain of the target.
@@ -69,7 +69,7 @@ impl ToneResponse {
     }
 
     /// The output at w / (2 pi) = `frequency`.
-    pub(crate) fn at(&self, frequency: f64) -> Tone {
+    pub(crate) fn at(&self, frequency: f64) -> ToneOutput {
         let Problem { ratio, latency, front_ends, target, channels, .. } = &self.problem;
         let w = TAU * frequency;
         let passed: Vec<Complex<f64>> =
@@ -98,11 +98,11 @@ impl ToneResponse {
         let wanted = passed[*target] * Complex::from_polar(1.0, -w * *latency as f64);
         let gain_error = (outputs[0] / *ratio as f64 / wanted - 1.0).norm();
         let gain_error = gain_error.hypot(beside[0].sqrt() / (*ratio as f64 * wanted.norm()));
-        Tone { frequency: CyclesPerFastPeriod(frequency), target: wanted.norm(), image, gain_error }
+        ToneOutput { frequency: CyclesPerFastPeriod(frequency), target: wanted.norm(), image, gain_error }
     }
 
     /// Tones at `count` equidistant frequencies of a band, ends included.
-    pub(crate) fn curve(&self, [low, high]: [CyclesPerFastPeriod; 2], count: usize) -> Vec<Tone> {
+    pub(crate) fn curve(&self, [low, high]: [CyclesPerFastPeriod; 2], count: usize) -> Vec<ToneOutput> {
         let step = (high.0 - low.0) / count.saturating_sub(1).max(1) as f64;
         (0..count).map(|k| self.at(low.0 + step * k as f64)).collect()
     }
@@ -112,8 +112,9 @@ impl ToneResponse {
     pub(crate) fn worst(&self, band: [CyclesPerFastPeriod; 2]) -> Worst {
         let grid = self.grid(band);
         let largest = grid.iter().map(|tone| tone.target).fold(0.0, f64::max);
-        let counts = |tone: &Tone| tone.target > VANISHING * largest;
-        let value = |of: fn(&Tone) -> f64| move |tone: &Tone| if counts(tone) { of(tone) } else { 0.0 };
+        let counts = |tone: &ToneOutput| tone.target > VANISHING * largest;
+        let value =
+            |of: fn(&ToneOutput) -> f64| move |tone: &ToneOutput| if counts(tone) { of(tone) } else { 0.0 };
         Worst {
             image: self.peak(&grid, &value(|tone| tone.image)),
             gain_error: self.peak(&grid, &value(|tone| tone.gain_error)),
@@ -122,7 +123,7 @@ impl ToneResponse {
     }
 
     /// Points dense enough for every peak of the filters, and those at the resonances of a recursion.
-    fn grid(&self, [low, high]: [CyclesPerFastPeriod; 2]) -> Vec<Tone> {
+    fn grid(&self, [low, high]: [CyclesPerFastPeriod; 2]) -> Vec<ToneOutput> {
         let period = self.problem.ratio as f64;
         let work = self.filters.lags() * self.problem.ratio * self.problem.channels.len();
         let peaks = (high.0 - low.0) * self.filters.lags() as f64 * period;
@@ -143,7 +144,7 @@ impl ToneResponse {
 
     /// The largest value near the largest local peaks of the grid; `None` where a value is not a number or
     /// infinite: then the bank gives no tone at all.
-    fn peak(&self, grid: &[Tone], value: &dyn Fn(&Tone) -> f64) -> Option<Tone> {
+    fn peak(&self, grid: &[ToneOutput], value: &dyn Fn(&ToneOutput) -> f64) -> Option<ToneOutput> {
         if !grid.iter().all(|tone| value(tone).is_finite()) {
             return None;
         }
@@ -160,7 +161,12 @@ impl ToneResponse {
     }
 
     /// Golden section between two frequencies, or `best` where nothing is larger.
-    fn refined(&self, [mut low, mut high]: [f64; 2], mut best: Tone, value: &dyn Fn(&Tone) -> f64) -> Tone {
+    fn refined(
+        &self,
+        [mut low, mut high]: [f64; 2],
+        mut best: ToneOutput,
+        value: &dyn Fn(&ToneOutput) -> f64,
+    ) -> ToneOutput {
         let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
         for _ in 0..STEPS {
             let (a, b) = (high - ratio * (high - low), low + ratio * (high - low));
@@ -194,9 +200,9 @@ fn answer(
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Worst {
     /// Largest image; `None` where the bank passes some tone not at all.
-    pub(crate) image: Option<Tone>,
+    pub(crate) image: Option<ToneOutput>,
     /// Largest error of gain.
-    pub(crate) gain_error: Option<Tone>,
+    pub(crate) gain_error: Option<ToneOutput>,
     /// Whether the target is zero somewhere in the band.
     pub(crate) vanishes: bool,
 }

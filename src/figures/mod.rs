@@ -3,10 +3,10 @@
 //!
 //! # Tones
 //! A tone at the analog frequency w gives the samples `g_i Phi_i(j w) e^{-j w D_i} e^{j w k M}` (h = 1), and
-//! the bank answers with tones at w + 2 pi k / M ([`Tone`]). The one for k = 0 against the target's is the
-//! error of gain and phase; the others are images. The largest image over a band predicts the spurious-free
-//! dynamic range. Delays and gains within the spec's `[uncertainty]` count as the mean over Gaussian errors
-//! whose 95 % intervals are the stated ones, constant for each converter.
+//! the bank answers with tones at w + 2 pi k / M ([`ToneOutput`]). The one for k = 0 against the target's
+//! is the error of gain and phase; the others are images. The largest image over a band predicts the
+//! spurious-free dynamic range. Delays and gains within the spec's `[uncertainty]` count as the mean over
+//! Gaussian errors whose 95 % intervals are the stated ones, constant for each converter.
 //!
 //! # Signal-to-noise ratio
 //! Variance of the target over the variance of the error, averaged over time, in decibels. For white noise
@@ -33,7 +33,7 @@ mod spline;
 #[cfg(test)]
 mod tests;
 
-pub use crate::design::{BandSource, FigureBand, Tone};
+pub use crate::design::{BandSource, FigureBand, ToneOutput};
 pub use setup::Setup;
 pub use simple::{Alone, SimpleFigure, SimpleWay};
 pub use snr::Snr;
@@ -86,7 +86,7 @@ pub struct ToneFigure {
 }
 
 impl ToneFigure {
-    fn new(spec: &Spec, tone: &Tone, ratio: f64) -> Self {
+    fn new(spec: &Spec, tone: &ToneOutput, ratio: f64) -> Self {
         let hertz = Hertz(tone.frequency.0 / spec.fast_period.0);
         Self { db: Decibels::of_amplitude(ratio), hertz }
     }
@@ -191,7 +191,7 @@ pub fn target_band(spec: &Spec) -> Result<Option<Band>, DesignError> {
 ///
 /// # Errors
 /// As [`Figures::new`].
-pub fn tone_curve(bank: &Bank, points: usize) -> Result<Vec<(Hertz, Tone)>, DesignError> {
+pub fn tone_curve(bank: &Bank, points: usize) -> Result<Vec<(Hertz, ToneOutput)>, DesignError> {
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
     let plain = without_signal(spec, bank.latency)?;
     let band = FigureBand::new(spec, &plain).cycles(spec);

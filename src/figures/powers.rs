@@ -3,7 +3,7 @@
 
 use super::integral::mean_over_circle;
 use super::reconstruction::Reconstruction;
-use crate::design::{Columns, Deviations, Signal};
+use crate::design::{AliasColumns, Deviations, SampledSignal};
 use crate::linalg::{CMat, Complex};
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ const ANGLES: std::ops::RangeInclusive<f64> = 120.0..=40_000.0;
 /// What a mean square error is computed for.
 pub(super) struct Conditions {
     /// The signal.
-    pub(super) signal: Signal,
+    pub(super) signal: SampledSignal,
     /// s_i^2 of each channel, in the scale of the signal.
     pub(super) noise: Vec<f64>,
     /// How far each converter is from the spec; offsets are in the scale of the signal.
@@ -38,7 +38,7 @@ pub(super) struct Powers {
 }
 
 /// The mean square of the target.
-pub(super) fn target_power(signal: &Signal) -> f64 {
+pub(super) fn target_power(signal: &SampledSignal) -> f64 {
     let work = signal.columns() * signal.problem().ratio;
     let breaks = even_and(signal.breaks());
     let power =
@@ -89,7 +89,13 @@ impl Conditions {
     }
 
     /// The mean squares of [`Powers`] at an angle without the offsets, summed over the M phases.
-    fn at(&self, way: &Reconstruction, theta: f64, columns: &Columns, late: Option<&Columns>) -> [f64; 4] {
+    fn at(
+        &self,
+        way: &Reconstruction,
+        theta: f64,
+        columns: &AliasColumns,
+        late: Option<&AliasColumns>,
+    ) -> [f64; 4] {
         let filters = way.at(theta, columns, &self.noise);
         let signal = error(columns, &filters);
         let late = late.filter(|_| way.is_relative()).map_or(signal, |late| error(late, &filters));
@@ -105,7 +111,7 @@ impl Conditions {
     }
 
     /// The columns with delays that are off; `None` where all are exact.
-    fn late(&self, columns: &Columns) -> Option<Columns> {
+    fn late(&self, columns: &AliasColumns) -> Option<AliasColumns> {
         let delays: Vec<Deviations> = self
             .spread
             .iter()
@@ -126,7 +132,7 @@ fn power(filters: &CMat, of: &CMat, samples: Range<usize>) -> f64 {
 }
 
 /// The squared Frobenius norm of W - F H, from amplitudes: nothing of size 1 is subtracted from a square.
-fn error(columns: &Columns, filters: &CMat) -> f64 {
+fn error(columns: &AliasColumns, filters: &CMat) -> f64 {
     let mut error = columns.reference.clone();
     error.gemm(-Complex::ONE, filters, &columns.measurement, Complex::ONE);
     error.norm_squared()

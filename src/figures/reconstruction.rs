@@ -3,7 +3,7 @@
 
 use super::spline::Spline;
 use crate::design::filters::FilterResponse;
-use crate::design::{Columns, NearestSample, Problem, nearest_samples};
+use crate::design::{AliasColumns, NearestSample, Problem, nearest_samples};
 use crate::linalg::{self, CMat, Complex};
 use std::ops::Range;
 
@@ -34,7 +34,7 @@ impl Reconstruction {
     }
 
     /// F at the angle theta, M x N, for a signal with `columns` there and the noise powers `noise`.
-    pub(super) fn at(&self, theta: f64, columns: &Columns, noise: &[f64]) -> CMat {
+    pub(super) fn at(&self, theta: f64, columns: &AliasColumns, noise: &[f64]) -> CMat {
         match self {
             Self::Bank(filters) => filters.at(theta),
             Self::Interleaving(nearest) => interleaved(nearest, noise.len(), theta),
@@ -63,7 +63,7 @@ fn interleaved(nearest: &[NearestSample], channels: usize, theta: f64) -> CMat {
 }
 
 /// W H* (H H* + S)^-1 in the columns of the samples of a converter, with their rows H and noise S.
-fn wiener(columns: &Columns, noise: &[f64], samples: Range<usize>) -> CMat {
+fn wiener(columns: &AliasColumns, noise: &[f64], samples: Range<usize>) -> CMat {
     let rows = columns.measurement.rows(samples.start, samples.len());
     let mut filters = CMat::zeros(columns.reference.nrows(), noise.len());
     if samples.len() == 1 {

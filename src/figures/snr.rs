@@ -4,7 +4,7 @@ use super::powers::{Conditions, Powers, target_power};
 use super::reconstruction::Reconstruction;
 use crate::bank::Bank;
 use crate::design::filters::FilterResponse;
-use crate::design::{DesignError, Deviations, Problem, Signal};
+use crate::design::{DesignError, Deviations, Problem, SampledSignal};
 use crate::spec::{ROUNDING_16_BITS, Spec, USUAL_RMS};
 use crate::units::Decibels;
 
@@ -60,7 +60,7 @@ impl Setting {
         let stated: Vec<f64> = spec.channels.iter().map(|channel| channel.sample_noise().powi(2)).collect();
         let stated = spec.layout().each(&stated);
         let jitter = Problem::jitter_shares(spec, latency)?;
-        let signal = Signal::of(&Problem::new(spec, latency)?);
+        let signal = SampledSignal::of(&Problem::new(spec, latency)?);
         let target = target_power(&signal);
         let rms = spec.signal.as_ref().map(|signal| signal.rms);
         let noise_is_stated = stated.iter().chain(&jitter).any(|power| *power > 0.0);

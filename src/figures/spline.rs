@@ -12,26 +12,26 @@ pub(super) struct Spline {
     period: f64,
     channels: usize,
     /// In increasing order.
-    knots: Vec<Knot>,
+    knots: Vec<SplineKnot>,
     /// One for each output phase.
-    outputs: Vec<Output>,
+    outputs: Vec<SplineOutput>,
 }
 
 /// An instant at which samples are taken in every slow period.
-struct Knot {
+struct SplineKnot {
     /// Fast periods, from 0 to below M.
     time: f64,
-    samples: Vec<Sample>,
+    samples: Vec<KnotSample>,
 }
 
 /// The sample of a channel, of the frame that is `lag` frames before that of the knot.
-struct Sample {
+struct KnotSample {
     channel: usize,
     lag: f64,
 }
 
 /// An output phase: the spline at `time` from 0 to below M, `lag` frames before the frame of the output.
-struct Output {
+struct SplineOutput {
     time: f64,
     lag: f64,
 }
@@ -39,27 +39,27 @@ struct Output {
 impl Spline {
     pub(super) fn new(problem: &Problem) -> Self {
         let period = problem.ratio as f64;
-        let mut taken: Vec<(f64, Sample)> = problem
+        let mut taken: Vec<(f64, KnotSample)> = problem
             .channels
             .iter()
             .enumerate()
             .map(|(channel, of)| {
                 let (lag, phase) = of.delay.negative().in_slow_period(problem.ratio);
-                (phase.in_fast_periods().0, Sample { channel, lag })
+                (phase.in_fast_periods().0, KnotSample { channel, lag })
             })
             .collect();
         taken.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut knots: Vec<Knot> = Vec::new();
+        let mut knots: Vec<SplineKnot> = Vec::new();
         for (time, sample) in taken {
             match knots.last_mut() {
                 Some(knot) if time - knot.time < LEAST_DISTANCE => knot.samples.push(sample),
-                _ => knots.push(Knot { time, samples: vec![sample] }),
+                _ => knots.push(SplineKnot { time, samples: vec![sample] }),
             }
         }
         let output = |p: usize| {
             let instant = p as f64 - problem.latency as f64;
             let frames = (instant / period).floor();
-            Output { time: instant - frames * period, lag: -frames }
+            SplineOutput { time: instant - frames * period, lag: -frames }
         };
         let outputs = (0..problem.ratio).map(output).collect();
         Self { period, channels: problem.channels.len(), knots, outputs }

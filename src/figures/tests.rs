@@ -7,7 +7,7 @@ use super::snr::Ratios;
 use super::*;
 use crate::bank::SynthesisFilters;
 use crate::design::filters::FilterResponse;
-use crate::design::{Options, Signal, analyze_mean, design, filters};
+use crate::design::{DesignOptions, SampledSignal, analyze_mean, design, filters};
 use crate::linalg::{self, Mat};
 use crate::random::Random;
 use crate::simulate::{Analog, Source, Tone as SourceTone, capture};
@@ -43,7 +43,7 @@ impl System {
     }
 
     fn bank(&self, design: &str) -> Bank {
-        crate::design::design(&self.spec(design), &Options::without_proof()).unwrap().bank
+        crate::design::design(&self.spec(design), &DesignOptions::without_proof()).unwrap().bank
     }
 }
 
@@ -78,7 +78,7 @@ fn simple_ways_have_the_digits_of_another_program() {
         case(2, RC, &[1.3, 0.8, 0.1], 0.425, 42.007, None, 4.046),
     ] {
         let plain = without_signal(&system.spec(SINC), 24).unwrap();
-        let signal = Signal::of(&Problem::new(&system.spec(SINC), 24).unwrap());
+        let signal = SampledSignal::of(&Problem::new(&system.spec(SINC), 24).unwrap());
         let channels = system.delays.len();
         let spread = vec![Deviations::default(); channels];
         let target = target_power(&signal);
@@ -141,7 +141,7 @@ fn errors_of_noise_and_of_uncertain_delays_have_the_digits_of_covariances() {
     ] {
         let bank = mean_square_optimum(noise);
         let plain = without_signal(bank.spec.as_ref().unwrap(), 10).unwrap();
-        let signal = Signal::of(&plain);
+        let signal = SampledSignal::of(&plain);
         let spread = [0.0, spread]
             .map(|delay| Deviations { delay: FastPeriods(delay), ..Deviations::default() })
             .to_vec();
@@ -161,7 +161,7 @@ fn the_error_from_white_noise_is_that_of_the_error_system() {
         [(&THESIS, FIR_24, 2e-4), (&THESIS, "{ method = \"iir\" }", 2e-4), (&rc, FIR_24, 5e-3)]
     {
         let bank = system.bank(design);
-        let signal = Signal::of(&without_signal(bank.spec.as_ref().unwrap(), bank.latency).unwrap());
+        let signal = SampledSignal::of(&without_signal(bank.spec.as_ref().unwrap(), bank.latency).unwrap());
         let target = target_power(&signal);
         let conditions = Conditions {
             signal,
@@ -329,7 +329,8 @@ fn check_prediction(seed: u64) {
         let delay = ratio as f64 * (i as f64 + 0.6 * random.part()) / channels as f64;
         let _ = write!(text, "[[channel]]\ndelay = {delay}\ngain = {}\n", 1.0 + 0.1 * random.sample());
     }
-    let bank = design(&Spec::from_toml(&text, "spec.toml").unwrap(), &Options::without_proof()).unwrap().bank;
+    let bank =
+        design(&Spec::from_toml(&text, "spec.toml").unwrap(), &DesignOptions::without_proof()).unwrap().bank;
     let figures = Figures::new(&bank).unwrap();
     let SynthesisFilters::Fir(taps) = &bank.filters else { panic!("FIR") };
     let plain = without_signal(bank.spec.as_ref().unwrap(), bank.latency).unwrap();

@@ -3,7 +3,7 @@
 use super::ExportError;
 use super::bit_true::IntegerFilters;
 use super::layout::{PolyphaseTaps, sparse_rows};
-use crate::bank::{Bank, FixedPoint, StateSpace, SynthesisFilters};
+use crate::bank::{Bank, FixedPoint, StateMatrices, SynthesisFilters};
 
 /// Numbers per line of a table.
 const PER_LINE: usize = 4;
@@ -84,7 +84,7 @@ fn double(value: &f64) -> String {
 }
 
 fn real_fir(bank: &Bank, taps: &PolyphaseTaps<f64>, name: &str) -> String {
-    fir(&Fir {
+    fir(&FirHeader {
         name,
         sizes: [taps.channels, taps.ratio, taps.lags],
         comment: format!("{} taps, {} not zero", taps.values.len(), taps.nonzero()),
@@ -135,7 +135,7 @@ fn integer_fir(
         taps.channels,
         table(&filters.resting, ToString::to_string)
     );
-    Ok(fir(&Fir {
+    Ok(fir(&FirHeader {
         name,
         sizes: [taps.channels, taps.ratio, taps.lags],
         comment: format!(
@@ -187,7 +187,7 @@ fn rounding(name: &str, fraction_bits: i32) -> String {
 }
 
 /// The parts of a header for FIR filters.
-struct Fir<'a> {
+struct FirHeader<'a> {
     name: &'a str,
     /// N, M and the lags.
     sizes: [usize; 3],
@@ -212,9 +212,9 @@ struct Fir<'a> {
     finish: String,
 }
 
-fn fir(parts: &Fir<'_>) -> String {
-    let Fir { name, sizes: [n, m, lags], comment, include, number, sample, tap, taps, .. } = parts;
-    let Fir { constants, reset, sample_of, start, helper, finish, .. } = parts;
+fn fir(parts: &FirHeader<'_>) -> String {
+    let FirHeader { name, sizes: [n, m, lags], comment, include, number, sample, tap, taps, .. } = parts;
+    let FirHeader { constants, reset, sample_of, start, helper, finish, .. } = parts;
     format!(
         "{include}\n\n\
          /* {comment}.\n   taps[channel][phase][lag]: tap phase + lag * {m} of the channel's filter. */\n\
@@ -235,7 +235,7 @@ fn fir(parts: &Fir<'_>) -> String {
     )
 }
 
-fn recursive(bank: &Bank, block: &StateSpace, name: &str) -> String {
+fn recursive(bank: &Bank, block: &StateMatrices, name: &str) -> String {
     let (rows, states) = (sparse_rows(block), block.a.len());
     let (inputs, outputs) = (bank.frame_samples(), bank.ratio);
     let starts: Vec<usize> = std::iter::once(0)

@@ -1,6 +1,6 @@
 //! The coefficients in the order in which every format has them.
 
-use crate::bank::StateSpace;
+use crate::bank::StateMatrices;
 
 /// FIR taps by channel, phase and lag.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,7 +44,7 @@ impl<T: Copy + Default + PartialEq> PolyphaseTaps<T> {
 
 /// The rows of `[a b; c d]` without their zeros: for each, states first, the columns of `[x; u]` with their
 /// coefficients.
-pub fn sparse_rows(block: &StateSpace) -> Vec<Vec<(usize, f64)>> {
+pub fn sparse_rows(block: &StateMatrices) -> Vec<Vec<(usize, f64)>> {
     let row = |(left, right): (&Vec<f64>, &Vec<f64>)| {
         left.iter().chain(right).copied().enumerate().filter(|&(_, value)| value != 0.0).collect()
     };

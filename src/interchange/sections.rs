@@ -1,7 +1,7 @@
 //! Recursive banks as sections of second order.
 
 use super::ExportError;
-use crate::bank::{Bank, StateSpace, SynthesisFilters};
+use crate::bank::{Bank, StateMatrices, SynthesisFilters};
 use crate::runtime::{DelayLines, DelayedInput};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -134,7 +134,7 @@ impl Poles {
 
 /// The state-space filters of sections: delay lines of the inputs, and for each pair of poles and each phase
 /// two states in observer form, which all channels drive.
-pub fn block_of_sections(sections: &[Section], channels: usize, ratio: usize) -> StateSpace {
+pub fn block_of_sections(sections: &[Section], channels: usize, ratio: usize) -> StateMatrices {
     let states = SectionStates::of(sections, channels);
     let mut block = states.undriven(ratio);
     for section in sections {
@@ -179,10 +179,10 @@ impl SectionStates {
     }
 
     /// Delay lines with their inputs, and poles that nothing drives yet.
-    fn undriven(&self, ratio: usize) -> StateSpace {
+    fn undriven(&self, ratio: usize) -> StateMatrices {
         let (n, channels) = (self.pair(self.poles.len()), self.lines.len());
         let zeros = |rows: usize, columns: usize| vec![vec![0.0; columns]; rows];
-        let mut block = StateSpace {
+        let mut block = StateMatrices {
             a: zeros(n, n),
             b: zeros(n, channels),
             c: zeros(ratio, n),
@@ -202,7 +202,7 @@ impl SectionStates {
     }
 
     /// Taps to the outputs of the delay line.
-    fn add_taps(&self, block: &mut StateSpace, section: &Section) {
+    fn add_taps(&self, block: &mut StateMatrices, section: &Section) {
         for (delay, b) in (section.delay..).zip(section.b) {
             match delay.checked_sub(1) {
                 None => block.d[section.phase][section.channel] += b,
@@ -215,7 +215,7 @@ impl SectionStates {
     }
 
     /// The numerator to the inputs of the pair. b0 is zero: the poles follow a delay.
-    fn drive_poles(&self, block: &mut StateSpace, section: &Section) {
+    fn drive_poles(&self, block: &mut StateMatrices, section: &Section) {
         let own = |pole: &(usize, [f64; 2])| *pole == (section.phase, section.a);
         let Some(pair) = self.poles.iter().position(own) else { return };
         for (state, b) in (self.pair(pair)..).zip(&section.b[1..]) {

@@ -32,7 +32,7 @@ impl FirWithTail {
     /// # Errors
     /// [`LtiError`] if the system is not stable.
     pub(crate) fn new(system: &StateSpace) -> Result<Self, LtiError> {
-        let chains = Chains::new(system.a());
+        let chains = DelayChains::new(system.a());
         let Self { head, tail } = Self::split(system, chains.longest);
         let tail = tail.select_states(chains.core);
         let energy = head.iter().map(Mat::norm_squared).sum::<f64>() + h2_norm(&tail)?.powi(2);
@@ -88,14 +88,14 @@ impl FirWithTail {
 }
 
 /// The delay chains that drive only the output, recognised by exact zeros.
-struct Chains {
+struct DelayChains {
     /// Steps after which none of them has any effect.
     longest: usize,
     /// All other states.
     core: Vec<usize>,
 }
 
-impl Chains {
+impl DelayChains {
     fn new(a: &Mat) -> Self {
         let mut core: Vec<usize> = (0..a.nrows()).collect();
         let mut longest = 0;

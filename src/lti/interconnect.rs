@@ -46,19 +46,6 @@ impl StateSpace {
         }
     }
 
-    /// `F(z) = sum_j z^-j F_j`, all `F_j` of one shape, with a shift register for each input: the states
-    /// hold its last samples, newest first. An empty list gives the system without inputs and outputs.
-    pub(crate) fn fir(taps: &[Mat]) -> Self {
-        let Some(d) = taps.first() else { return Self::gain(Mat::zeros(0, 0)) };
-        let (stored, inputs) = (taps.len() - 1, d.ncols());
-        let lengths = vec![stored; inputs];
-        let Self { a, b, .. } = Self::delays(&lengths);
-        let c = Mat::from_fn(d.nrows(), inputs * stored, |p, state| {
-            taps[state % stored + 1][(p, state / stored)]
-        });
-        Self { a, b, c, d: d.clone() }
-    }
-
     /// `next`, which has an input for each output, driven by this system: the transfer function
     /// `N(z) G(z)`.
     pub(crate) fn series(&self, next: &Self) -> Self {

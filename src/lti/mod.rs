@@ -4,6 +4,7 @@
 //! helpers (`exponential`) serve exact discretisation.
 
 pub(crate) mod exponential;
+mod fir_matrix;
 mod fir_with_tail;
 pub(crate) mod gramian;
 mod interconnect;
@@ -14,6 +15,7 @@ mod response;
 pub(crate) mod riccati;
 mod state_space;
 
+pub use fir_matrix::FirMatrix;
 pub(crate) use fir_with_tail::FirWithTail;
 pub(crate) use gramian::GramianCoordinates;
 pub use refine::Peak;

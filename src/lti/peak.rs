@@ -55,7 +55,7 @@ pub(crate) fn unexplained_peak(system: &StateSpace, measurements: usize) -> Resu
     let poles = stable_poles(system)?;
     let system = system.compress_inputs();
     let response = FrequencyResponse::new(&system);
-    Search::new(&system, measurements, &|w| response.at_frequency(w), resonances(&poles)).run()
+    PeakSearch::new(&system, measurements, &|w| response.at_frequency(w), resonances(&poles)).run()
 }
 
 /// The H-infinity norm of a system that is known to be stable, with a response that is cheaper than its
@@ -66,7 +66,7 @@ pub(crate) fn hinf_norm_with_response(
     response: &dyn Fn(f64) -> CMat,
     initial: Vec<f64>,
 ) -> Result<Peak, LtiError> {
-    Search::new(&system.compress_inputs(), 0, response, initial).run()
+    PeakSearch::new(&system.compress_inputs(), 0, response, initial).run()
 }
 
 /// The peaks of a stable system above `level`: at least one in each frequency interval in which the gain
@@ -75,7 +75,7 @@ pub(crate) fn peaks_above(system: &StateSpace, level: f64) -> Result<Vec<Peak>, 
     let poles = stable_poles(system)?;
     let system = system.compress_inputs();
     let response = FrequencyResponse::new(&system);
-    Search::new(&system, 0, &|w| response.at_frequency(w), resonances(&poles)).all_above(level)
+    PeakSearch::new(&system, 0, &|w| response.at_frequency(w), resonances(&poles)).all_above(level)
 }
 
 /// The poles of a stable system.
@@ -117,7 +117,7 @@ pub(crate) fn unexplained_gain(response: &CMat, measurements: usize) -> Result<f
 }
 
 /// The search on one system.
-struct Search<'a> {
+struct PeakSearch<'a> {
     system: StateSpace,
     measurements: usize,
     response: &'a dyn Fn(f64) -> CMat,
@@ -128,7 +128,7 @@ struct Search<'a> {
     floor: f64,
 }
 
-impl<'a> Search<'a> {
+impl<'a> PeakSearch<'a> {
     fn new(
         system: &StateSpace,
         measurements: usize,

@@ -28,7 +28,7 @@ pub(crate) struct RiccatiSolution {
 /// Solves X = F' X (I + G X)^-1 F + H for the stabilising X; all matrices n x n. `None` if the doubling does
 /// not converge or ends at no solution; one may still exist.
 pub(crate) fn solve_doubling(f: &Mat, g: &Mat, h: &Mat) -> Option<RiccatiSolution> {
-    let mut iterate = Iterate { f: f.clone(), g: g.clone(), x: h.clone() };
+    let mut iterate = DoublingIterate { f: f.clone(), g: g.clone(), x: h.clone() };
     for _ in 0..DOUBLING_LIMIT {
         let change = iterate.double();
         if !change.is_finite() {
@@ -41,13 +41,13 @@ pub(crate) fn solve_doubling(f: &Mat, g: &Mat, h: &Mat) -> Option<RiccatiSolutio
     None
 }
 
-struct Iterate {
+struct DoublingIterate {
     f: Mat,
     g: Mat,
     x: Mat,
 }
 
-impl Iterate {
+impl DoublingIterate {
     /// One doubling; returns the relative change of x.
     fn double(&mut self) -> f64 {
         let n = self.f.nrows();

@@ -62,7 +62,7 @@ pub(super) struct Settled {
 }
 
 /// A sample at which record and reference are known.
-pub(super) struct Point {
+pub(super) struct AlignedSample {
     /// Index in the record.
     pub(super) n: usize,
     /// r(n - lag).
@@ -141,7 +141,7 @@ impl<'a> Alignment<'a> {
     }
 
     /// The samples at which both are known.
-    pub(super) fn points(&self) -> impl Iterator<Item = Point> {
+    pub(super) fn points(&self) -> impl Iterator<Item = AlignedSample> {
         let weights = kernel(self.phase);
         let (before, after) = (kernel(self.phase - DERIVATIVE_STEP), kernel(self.phase + DERIVATIVE_STEP));
         let slopes: Vec<f64> =
@@ -151,7 +151,7 @@ impl<'a> Alignment<'a> {
             let begin = (n as i64 - self.whole - reach) as usize;
             let near = &self.reference[begin..=begin + 2 * INTERPOLATION_REACH];
             let (value, slope) = (dot(near, &weights), dot(near, &slopes));
-            Point { n, value, slope, error: self.samples[n] - self.gain * value - self.offset }
+            AlignedSample { n, value, slope, error: self.samples[n] - self.gain * value - self.offset }
         };
         self.probed().map(point).filter(|point| point.error.is_finite())
     }

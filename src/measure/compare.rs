@@ -1,7 +1,7 @@
 //! A record against a reference: lag, gain, offset and error.
 
 use super::alignment::{Alignment, likely_lags};
-use super::{MeasureError, Spectrum, UnsettledEnds, Window};
+use super::{MeasureError, RecordSpectrum, UnsettledEnds, Window};
 use crate::linalg::Mat;
 use crate::sine_fit::Estimate;
 use crate::units::{Decibels, Hertz, Seconds};
@@ -53,15 +53,15 @@ pub struct Comparison {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unsettled_ends: Option<UnsettledEnds>,
     /// The error in equal bands from 0 to half the rate.
-    pub error_bands: Vec<Band>,
+    pub error_bands: Vec<ErrorBand>,
     /// The spectrum of the error.
     #[serde(skip)]
-    pub error_spectrum: Spectrum,
+    pub error_spectrum: RecordSpectrum,
 }
 
 /// The error in a band.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Band {
+pub struct ErrorBand {
     /// Beginning of the band.
     #[serde(rename = "from_hertz")]
     pub from: Hertz,
@@ -149,7 +149,7 @@ fn compared(alignment: &Alignment<'_>, rate: Hertz, window: Window, covariance: 
     let largest = points.iter().max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()));
     let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
     let lag = alignment.whole as f64 + alignment.phase;
-    let error_spectrum = Spectrum::new(&errors, rate, window);
+    let error_spectrum = RecordSpectrum::new(&errors, rate, window);
     Comparison {
         lag_samples: Estimate { value: lag, sigma: sigma(2) },
         lag: Seconds(lag / rate.0),
@@ -176,10 +176,10 @@ fn unaligned(alignment: &Alignment<'_>) -> Decibels {
     Decibels::of_power(signal / error)
 }
 
-fn bands(spectrum: &Spectrum, rate: Hertz) -> Vec<Band> {
+fn bands(spectrum: &RecordSpectrum, rate: Hertz) -> Vec<ErrorBand> {
     let bins = spectrum.amplitudes.len();
     let edge = |band: usize| rate * (0.5 * band as f64 / BANDS as f64);
-    let band = |i: usize| Band {
+    let band = |i: usize| ErrorBand {
         from: edge(i),
         to: edge(i + 1),
         rms: spectrum.mean_square(i * bins / BANDS, (i + 1) * bins / BANDS).sqrt(),

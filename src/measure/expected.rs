@@ -1,6 +1,6 @@
 //! The lines that theory expects: their causes, their frequencies, and which of them coincide.
 
-use crate::sine_fit::{Direction, alias};
+use crate::sine_fit::{Sense, alias};
 use std::fmt;
 
 /// The cause of a spur. Tones count from 1; 0 stands for the only tone.
@@ -99,7 +99,7 @@ impl fmt::Display for Cause {
 
 /// A line at which at least one spur is expected.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Line {
+pub(super) struct ExpectedLine {
     /// Cycles per sample, 0 to 1/2.
     pub(super) cycles: f64,
     /// The spurs there.
@@ -108,16 +108,16 @@ pub(super) struct Line {
     backward: Vec<Cause>,
 }
 
-impl Line {
-    pub(super) fn causes(&self, direction: Direction) -> &[Cause] {
-        if direction == Direction::Forward { &self.forward } else { &self.backward }
+impl ExpectedLine {
+    pub(super) fn causes(&self, direction: Sense) -> &[Cause] {
+        if direction == Sense::Forward { &self.forward } else { &self.backward }
     }
 }
 
 /// The expected lines of a record.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Expected {
-    pub(super) lines: Vec<Line>,
+    pub(super) lines: Vec<ExpectedLine>,
     /// The line at exactly half the rate, where there is no phase: offsets, if there is an even number of
     /// converters.
     pub(super) half_rate: Option<Cause>,
@@ -202,11 +202,11 @@ impl Expected {
             return self.hidden.push(cause);
         }
         let at = self.lines.iter().position(|line| is_near(line.cycles)).unwrap_or_else(|| {
-            self.lines.push(Line { cycles: folded, ..Line::default() });
+            self.lines.push(ExpectedLine { cycles: folded, ..ExpectedLine::default() });
             self.lines.len() - 1
         });
         let is_backward = pattern.is_complex && cycles - cycles.round() < 0.0;
-        let Line { forward, backward, .. } = &mut self.lines[at];
+        let ExpectedLine { forward, backward, .. } = &mut self.lines[at];
         let (own, other) = if is_backward { (backward, forward) } else { (forward, backward) };
         own.push(cause);
         if pattern.is_complex {

@@ -1,9 +1,9 @@
 //! The amplitudes of lines, and what is left without them.
 
 use super::expected::{Expected, Pattern, unexpected};
-use super::record::Record;
+use super::record::RecordParts;
 use super::{Cause, MeasureError};
-use crate::sine_fit::{Direction, SineFit, alias, find_tones, fit, fit_known};
+use crate::sine_fit::{Sense, SineFit, alias, find_tones, fit, fit_known};
 use crate::units::{Decibels, Hertz};
 use std::f64::consts::SQRT_2;
 
@@ -23,7 +23,7 @@ const ALTERNATIONS: usize = 3;
 
 /// A line and its amplitude.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Found {
+pub(super) struct FoundLine {
     pub(super) frequency: Hertz,
     /// Of the sine of the same power: sqrt 2 times that of a line at half the rate.
     pub(super) amplitude: f64,
@@ -33,9 +33,9 @@ pub(super) struct Found {
 /// All lines beside the tones.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Lines {
-    pub(super) found: Vec<Found>,
+    pub(super) found: Vec<FoundLine>,
     /// What is left without tones, constant and lines; 0 where a sample is missing.
-    pub(super) rest: Record<'static>,
+    pub(super) rest: RecordParts<'static>,
     /// Variance of the noise of a part.
     pub(super) noise_power: f64,
     /// Amplitude above which a line counts as a spur.
@@ -45,7 +45,7 @@ pub(super) struct Lines {
 /// Fits all expected lines together with the tones, whose frequencies are known, and searches the rest for
 /// more.
 pub(super) fn fit_lines(
-    record: &Record<'_>,
+    record: &RecordParts<'_>,
     tones: &SineFit,
     expected: &Expected,
     pattern: &Pattern<'_>,
@@ -81,7 +81,7 @@ pub(super) fn fit_lines(
 
 impl Lines {
     /// Of what a fit of so many parameters to so many samples leaves.
-    fn new(found: Vec<Found>, rest: Record<'static>, used: usize, parameters: usize) -> Self {
+    fn new(found: Vec<FoundLine>, rest: RecordParts<'static>, used: usize, parameters: usize) -> Self {
         let noise_power = rest.energy() / used.saturating_sub(parameters).max(1) as f64;
         let log_probability = SIGNIFICANCE + (found.len().max(1) as f64).ln();
         let values = (used * rest.parts().len()) as f64;
@@ -97,13 +97,13 @@ struct Together {
     /// a of the line (-1)^n a, for each part.
     half_rate: Vec<f64>,
     /// What is left.
-    rest: Record<'static>,
+    rest: RecordParts<'static>,
 }
 
 impl Together {
     /// The lines disturb the first fit of the tones, so these are fitted again in what is left without
     /// lines.
-    fn fit(record: &Record<'_>, tones: &SineFit, expected: &Expected) -> Result<Self, MeasureError> {
+    fn fit(record: &RecordParts<'_>, tones: &SineFit, expected: &Expected) -> Result<Self, MeasureError> {
         let rate = tones.rate;
         let mut found: Vec<Hertz> = tones.frequencies.iter().map(|f| f.value).collect();
         let lines = found.len()..found.len() + expected.lines.len();
@@ -132,23 +132,23 @@ impl Together {
     }
 
     /// The expected lines, and in complex records the images of the tones.
-    fn found(&self, record: &Record<'_>, pattern: &Pattern<'_>, expected: &Expected) -> Vec<Found> {
+    fn found(&self, record: &RecordParts<'_>, pattern: &Pattern<'_>, expected: &Expected) -> Vec<FoundLine> {
         let (rate, tones) = (self.fit.rate, pattern.tones.len());
         let tones_of_images = (0..tones).filter(|_| pattern.is_complex);
-        let images = tones_of_images.map(|k| Found {
+        let images = tones_of_images.map(|k| FoundLine {
             frequency: rate * -pattern.seen(pattern.tones[k]),
-            amplitude: record.amplitude(&self.fit, k, Direction::Backward),
+            amplitude: record.amplitude(&self.fit, k, Sense::Backward),
             causes: vec![Cause::Image { order: 1, tone: pattern.number(k) }],
         });
         let lines = expected.lines.iter().enumerate().flat_map(|(k, line)| {
-            record.directions().iter().map(move |&direction| Found {
+            record.directions().iter().map(move |&direction| FoundLine {
                 frequency: rate * (direction.sign() * line.cycles),
                 amplitude: record.amplitude(&self.fit, tones + k, direction),
                 causes: line.causes(direction).to_vec(),
             })
         });
         let size = self.half_rate.iter().fold(0.0, |size: f64, a| size.hypot(*a));
-        let half_rate = expected.half_rate.map(|cause| Found {
+        let half_rate = expected.half_rate.map(|cause| FoundLine {
             frequency: rate * 0.5,
             amplitude: size * if record.is_complex() { 1.0 } else { SQRT_2 },
             causes: vec![cause],
@@ -174,20 +174,20 @@ fn without_half_rate(samples: &[f64], a: f64) -> Vec<f64> {
 
 /// The largest lines that nothing announces.
 struct Unexpected {
-    found: Vec<Found>,
+    found: Vec<FoundLine>,
     /// The sum of those that are apart from tones and expected lines. What is left of a line beside it is
     /// that line's own.
-    waves: Record<'static>,
+    waves: RecordParts<'static>,
     /// The largest amplitude of these.
     largest: f64,
     /// What is left without any of them.
-    rest: Record<'static>,
+    rest: RecordParts<'static>,
 }
 
 impl Unexpected {
     /// Fits and subtracts the largest lines of the rest, one after the other; those of complex records with
     /// what is at minus their frequency.
-    fn search(rest: &Record<'static>, rate: Hertz, pattern: &Pattern<'_>, expected: &Expected) -> Self {
+    fn search(rest: &RecordParts<'static>, rate: Hertz, pattern: &Pattern<'_>, expected: &Expected) -> Self {
         let waves = rest.map(|_, part| vec![0.0; part.len()]);
         let mut all = Self { found: Vec::new(), waves, largest: 0.0, rest: rest.clone() };
         for _ in 0..MOST_UNEXPECTED {
@@ -195,14 +195,14 @@ impl Unexpected {
             let Ok(start) = find_tones(&channels, rate, 1, RANGE) else { break };
             let Ok(line) = fit(&channels, rate, &start) else { break };
             let cycles = line.frequencies[0].value / rate;
-            let sides: Vec<Found> = all
+            let sides: Vec<FoundLine> = all
                 .rest
                 .directions()
                 .iter()
                 .map(|&direction| {
                     let cycles = direction.sign() * cycles;
                     let causes = vec![unexpected(pattern, expected, cycles)];
-                    Found {
+                    FoundLine {
                         frequency: rate * cycles,
                         amplitude: all.rest.amplitude(&line, 0, direction),
                         causes,
@@ -210,7 +210,7 @@ impl Unexpected {
                 })
                 .collect();
             let largest = sides.iter().fold(0.0, |largest: f64, side| largest.max(side.amplitude));
-            let faint = |first: &Found| largest < first.amplitude * (-RANGE).amplitude_ratio();
+            let faint = |first: &FoundLine| largest < first.amplitude * (-RANGE).amplitude_ratio();
             if all.found.first().is_some_and(faint) {
                 break;
             }

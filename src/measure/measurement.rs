@@ -1,11 +1,11 @@
 //! The figures of a record with tones.
 
 use super::expected::{Expected, Pattern};
-use super::lines::{Found, Lines, fit_lines};
-use super::record::{Quadrature, Record, UnsettledEnds};
-use super::{Cause, MeasureError, Settings, Spectrum, Window};
+use super::lines::{FoundLine, Lines, fit_lines};
+use super::record::{Quadrature, RecordParts, UnsettledEnds};
+use super::{Cause, MeasureError, RecordSpectrum, Settings, Window};
 use crate::sine_fit::SineFitError::{AtEdge, NoTone, TonesCoincide};
-use crate::sine_fit::{Direction, Estimate, SineFit, ToneFit, find_tones, fit, locate, with_lines};
+use crate::sine_fit::{Estimate, Sense, SineFit, ToneFit, find_tones, fit, locate, with_lines};
 use crate::units::{Decibels, Hertz, Radians};
 
 /// A tone that is given may be this far from the true one, in cycles per sample ..
@@ -35,7 +35,7 @@ pub struct Measurement {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadrature: Option<Quadrature>,
     /// The tones.
-    pub tones: Vec<Tone>,
+    pub tones: Vec<MeasuredTone>,
     /// Signal over everything else but the constant.
     #[serde(rename = "sinad_db")]
     pub sinad: Decibels,
@@ -77,7 +77,7 @@ pub struct Measurement {
     pub unsettled_ends: Option<UnsettledEnds>,
     /// The spectrum of the record without its constant.
     #[serde(skip)]
-    pub spectrum: Spectrum,
+    pub spectrum: RecordSpectrum,
 }
 
 impl Measurement {
@@ -89,7 +89,7 @@ impl Measurement {
 
 /// A fitted tone.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Tone {
+pub struct MeasuredTone {
     /// In its own Nyquist zone; in complex records with its sign.
     #[serde(rename = "frequency_hertz")]
     pub frequency: Estimate<Hertz>,
@@ -133,7 +133,7 @@ pub fn measure(samples: &[f64], rate: Hertz, settings: &Settings) -> Result<Meas
         let rule = "give a frequency above 0, for only complex samples tell its sign";
         return Err(MeasureError::Setting { setting: "a tone of a real record", value: tone.0, rule });
     }
-    measured(&Record::real(samples), rate, settings)
+    measured(&RecordParts::real(samples), rate, settings)
 }
 
 /// Measures a complex record of one or several tones e^{2 pi j f t}, each with the sign of its frequency.
@@ -152,10 +152,10 @@ pub fn measure_complex(
         let (setting, value) = ("the number of imaginary parts", imaginary.len() as f64);
         return Err(MeasureError::Setting { setting, value, rule: "there is one for each real part" });
     }
-    measured(&Record::complex(real, imaginary), rate, settings)
+    measured(&RecordParts::complex(real, imaginary), rate, settings)
 }
 
-fn measured(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
+fn measured(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
     settings.check()?;
     match figures(record, rate, settings) {
         // A peak that is searched for may be a trend, which no sine fits.
@@ -168,7 +168,7 @@ fn measured(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Mea
     }
 }
 
-fn figures(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
+fn figures(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
     let tones = fit_tones(record, rate, settings)?;
     let cycles: Vec<f64> = tones.frequencies.iter().map(|f| f.value / rate).collect();
     let pattern = Pattern {
@@ -181,26 +181,26 @@ fn figures(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Meas
     let expected = Expected::of(&pattern);
     let lines = fit_lines(record, &tones, &expected, &pattern)?;
     let rest = spectrum(&lines.rest, rate, settings.window);
-    Ok(Figures { record, pattern: &pattern, tones: &tones, lines: &lines, rest, settings }
+    Ok(FigureSources { record, pattern: &pattern, tones: &tones, lines: &lines, rest, settings }
         .assemble(expected.hidden))
 }
 
 /// The tones and, in complex records, their images. The largest tone of a complex record has the sign of its
 /// larger exponential.
-fn fit_tones(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<SineFit, MeasureError> {
+fn fit_tones(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Result<SineFit, MeasureError> {
     let channels = record.channels();
     let found = fit(&channels, rate, &starts(record, rate, settings)?)
         .map_err(|error| with_lines(error, &channels, rate))?;
     let size = |direction| record.amplitude(&found, 0, direction);
     let is_given = !settings.tones.is_empty() || !record.is_complex();
-    if is_given || size(Direction::Forward) >= size(Direction::Backward) {
+    if is_given || size(Sense::Forward) >= size(Sense::Backward) {
         return Ok(found);
     }
     Ok(fit(&channels, rate, &[-found.frequencies[0].value])?)
 }
 
 /// Frequencies at which the fit begins.
-fn starts(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Vec<Hertz>, MeasureError> {
+fn starts(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Result<Vec<Hertz>, MeasureError> {
     let channels = record.channels();
     if settings.tones.is_empty() {
         return Ok(find_tones(&channels, rate, 1, Decibels(0.0))?);
@@ -210,25 +210,25 @@ fn starts(record: &Record<'_>, rate: Hertz, settings: &Settings) -> Result<Vec<H
     settings.tones.iter().map(start).collect()
 }
 
-fn spectrum(record: &Record<'_>, rate: Hertz, window: Window) -> Spectrum {
+fn spectrum(record: &RecordParts<'_>, rate: Hertz, window: Window) -> RecordSpectrum {
     match record.parts() {
-        [real, imaginary] => Spectrum::complex(real, imaginary, rate, window),
-        parts => Spectrum::new(&parts[0], rate, window),
+        [real, imaginary] => RecordSpectrum::complex(real, imaginary, rate, window),
+        parts => RecordSpectrum::new(&parts[0], rate, window),
     }
 }
 
 /// What the figures are computed from.
-struct Figures<'a> {
-    record: &'a Record<'a>,
+struct FigureSources<'a> {
+    record: &'a RecordParts<'a>,
     pattern: &'a Pattern<'a>,
     tones: &'a SineFit,
     lines: &'a Lines,
     /// The spectrum of what is left without lines.
-    rest: Spectrum,
+    rest: RecordSpectrum,
     settings: &'a Settings,
 }
 
-impl Figures<'_> {
+impl FigureSources<'_> {
     fn assemble(&self, hidden: Vec<Cause>) -> Measurement {
         let Settings { converters, harmonics, full_scale, rails, window, .. } = *self.settings;
         let own = &self.tones.channels[0];
@@ -278,7 +278,7 @@ impl Figures<'_> {
 
     /// The tone k: the sine, or the exponential of a complex record.
     fn tone(&self, k: usize) -> ToneFit {
-        self.tones.phasor(self.record.wave(Direction::Forward), k)
+        self.tones.phasor(self.record.wave(Sense::Forward), k)
     }
 
     fn amplitudes(&self) -> impl Iterator<Item = f64> {
@@ -289,7 +289,7 @@ impl Figures<'_> {
     fn other_power(&self) -> f64 {
         let parts = self.tones.channels.iter().map(|part| part.residual_rms.powi(2));
         let rest = parts.sum::<f64>() / self.tones.channels.len() as f64;
-        let image = |k| 0.5 * self.record.amplitude(self.tones, k, Direction::Backward).powi(2);
+        let image = |k| 0.5 * self.record.amplitude(self.tones, k, Sense::Backward).powi(2);
         let images = (0..self.tones.tones()).filter(|_| self.record.is_complex()).map(image);
         rest + images.sum::<f64>()
     }
@@ -303,11 +303,11 @@ impl Figures<'_> {
         self.amplitudes().fold(0.0, f64::max)
     }
 
-    fn tones(&self) -> Vec<Tone> {
+    fn tones(&self) -> Vec<MeasuredTone> {
         let rate = self.tones.rate;
         let tone = |(k, frequency): (usize, &Estimate<Hertz>)| {
             let ToneFit { amplitude, phase } = self.tone(k);
-            Tone {
+            MeasuredTone {
                 frequency: *frequency,
                 alias: rate * self.pattern.seen(frequency.value / rate),
                 amplitude,
@@ -319,7 +319,7 @@ impl Figures<'_> {
     }
 
     /// The largest tone over the largest line that counts, or the largest bin of the rest.
-    fn sfdr(&self, counts: impl Fn(&Found) -> bool) -> Decibels {
+    fn sfdr(&self, counts: impl Fn(&FoundLine) -> bool) -> Decibels {
         let floor = self.rest.largest();
         let counted = self.lines.found.iter().filter(|line| counts(line));
         let largest = counted.fold(floor, |most, line| most.max(line.amplitude));
@@ -336,7 +336,7 @@ impl Figures<'_> {
 
     fn spurs(&self) -> Vec<Spur> {
         let largest = self.largest_tone();
-        let spur = |line: &Found| Spur {
+        let spur = |line: &FoundLine| Spur {
             frequency: line.frequency,
             amplitude: line.amplitude,
             level: Decibels::of_amplitude(line.amplitude / largest),
@@ -349,7 +349,7 @@ impl Figures<'_> {
     }
 
     /// The samples without their constant; the fitted tones where one is missing.
-    fn completed(&self) -> Record<'static> {
+    fn completed(&self) -> RecordParts<'static> {
         self.record.map(|i, part| {
             let offset = self.tones.channels[i].constant.value;
             if part.iter().all(|x| x.is_finite()) {

@@ -49,12 +49,12 @@ mod spectrum;
 mod tests;
 mod warning;
 
-pub use compare::{Band, Comparison, compare};
+pub use compare::{Comparison, ErrorBand, compare};
 pub use expected::Cause;
-pub use measurement::{Measurement, Spur, Tone, measure, measure_complex};
+pub use measurement::{MeasuredTone, Measurement, Spur, measure, measure_complex};
 pub use record::{Imbalance, Quadrature, UnsettledEnds};
-pub use spectrum::{Spectrum, Window};
-pub use warning::Warning;
+pub use spectrum::{RecordSpectrum, Window};
+pub use warning::MeasureWarning;
 
 use crate::sine_fit::SineFitError;
 use crate::units::Hertz;

@@ -1,6 +1,6 @@
 //! Real and complex records, their ends, and what the parts of complex ones lack of quadrature.
 
-use crate::sine_fit::{Channel, Component, Direction, Estimate, Ratio, SineFit};
+use crate::sine_fit::{Channel, Component, Estimate, Ratio, Sense, SineFit};
 use crate::units::{Decibels, Radians};
 use std::borrow::Cow;
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
@@ -13,12 +13,12 @@ const RAISED_POWER: f64 = 4.0;
 /// The samples of a record. Powers are means over its parts, so that those of a tone of the amplitude A are
 /// A^2 / 2 for both kinds.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Record<'a> {
+pub(super) struct RecordParts<'a> {
     /// The real samples, or the real and the imaginary parts, which are of one length.
     parts: Vec<Cow<'a, [f64]>>,
 }
 
-impl<'a> Record<'a> {
+impl<'a> RecordParts<'a> {
     pub(super) fn real(samples: &'a [f64]) -> Self {
         Self { parts: vec![Cow::Borrowed(samples)] }
     }
@@ -58,26 +58,26 @@ impl<'a> Record<'a> {
     }
 
     /// The same of each part, which is given with its number.
-    pub(super) fn map(&self, change: impl Fn(usize, &[f64]) -> Vec<f64>) -> Record<'static> {
+    pub(super) fn map(&self, change: impl Fn(usize, &[f64]) -> Vec<f64>) -> RecordParts<'static> {
         let parts = self.parts.iter().enumerate();
-        Record { parts: parts.map(|(i, part)| Cow::Owned(change(i, part))).collect() }
+        RecordParts { parts: parts.map(|(i, part)| Cow::Owned(change(i, part))).collect() }
     }
 
     /// With zeros in place of missing samples.
-    pub(super) fn filled(&self) -> Record<'static> {
+    pub(super) fn filled(&self) -> RecordParts<'static> {
         self.map(|_, part| part.iter().map(|x| if x.is_finite() { *x } else { 0.0 }).collect())
     }
 
-    pub(super) fn plus(&self, other: &Record<'_>) -> Record<'static> {
+    pub(super) fn plus(&self, other: &RecordParts<'_>) -> RecordParts<'static> {
         self.map(|i, part| part.iter().zip(other.parts[i].iter()).map(|(x, y)| x + y).collect())
     }
 
-    pub(super) fn minus(&self, other: &Record<'_>) -> Record<'static> {
+    pub(super) fn minus(&self, other: &RecordParts<'_>) -> RecordParts<'static> {
         self.map(|i, part| part.iter().zip(other.parts[i].iter()).map(|(x, y)| x - y).collect())
     }
 
     /// What a fit leaves.
-    pub(super) fn residual(&self, fit: &SineFit) -> Record<'static> {
+    pub(super) fn residual(&self, fit: &SineFit) -> RecordParts<'static> {
         self.map(|i, part| fit.residual(i, part))
     }
 
@@ -98,17 +98,17 @@ impl<'a> Record<'a> {
     }
 
     /// The exponentials that a frequency may have.
-    pub(super) fn directions(&self) -> &'static [Direction] {
-        if self.is_complex() { &[Direction::Forward, Direction::Backward] } else { &[Direction::Forward] }
+    pub(super) fn directions(&self) -> &'static [Sense] {
+        if self.is_complex() { &[Sense::Forward, Sense::Backward] } else { &[Sense::Forward] }
     }
 
     /// The sine in a fit of this record, or the exponential.
-    pub(super) fn wave(&self, direction: Direction) -> Component {
+    pub(super) fn wave(&self, direction: Sense) -> Component {
         if self.is_complex() { Component::Complex([0, 1], direction) } else { Component::Real(0) }
     }
 
     /// The amplitude at plus or minus the frequency of a tone.
-    pub(super) fn amplitude(&self, fit: &SineFit, tone: usize, direction: Direction) -> f64 {
+    pub(super) fn amplitude(&self, fit: &SineFit, tone: usize, direction: Sense) -> f64 {
         match self.wave(direction) {
             Component::Real(part) => fit.channels[part].tones[tone].amplitude.value,
             wave => fit.phasor(wave, tone).amplitude.value,
@@ -155,7 +155,7 @@ impl Quadrature {
 impl Imbalance {
     fn of(fit: &SineFit, tone: usize) -> Self {
         let Ratio { gain, phase } = fit.ratio(Component::Real(1), Component::Real(0), tone);
-        let [tone, image] = [Direction::Forward, Direction::Backward]
+        let [tone, image] = [Sense::Forward, Sense::Backward]
             .map(|direction| fit.phasor(Component::Complex([0, 1], direction), tone).amplitude.value);
         // The difference of phases beyond minus a quarter of a cycle, in -pi ..= pi.
         let (sine, cosine) = (phase.value.0 + FRAC_PI_2).sin_cos();

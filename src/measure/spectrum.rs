@@ -65,7 +65,7 @@ impl Window {
 /// complex records of the exponential. Bin k lies k fs / N above the first one, which is at 0; complex
 /// records begin with the bin after -fs / 2.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Spectrum {
+pub struct RecordSpectrum {
     /// The window of the record.
     pub window: Window,
     /// fs / N.
@@ -77,7 +77,7 @@ pub struct Spectrum {
     pub amplitudes: Vec<f64>,
 }
 
-impl Spectrum {
+impl RecordSpectrum {
     /// Of finite samples.
     pub fn new(samples: &[f64], rate: Hertz, window: Window) -> Self {
         let count = samples.len().max(1);

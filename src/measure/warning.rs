@@ -5,7 +5,7 @@ use super::{Cause, Measurement, Spur, UnsettledEnds};
 /// Why figures may not say what they seem to say.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Warning {
+pub enum MeasureWarning {
     /// Samples at the rails.
     #[error(
         "{clipped} of {samples} samples are at the limits of the range; SINAD and THD contain their distortion, so lower \
@@ -49,16 +49,16 @@ pub enum Warning {
 
 impl Measurement {
     /// What a reader must know beside the figures.
-    pub fn warnings(&self) -> Vec<Warning> {
+    pub fn warnings(&self) -> Vec<MeasureWarning> {
         let Self { samples, clipped, left_out, .. } = *self;
-        let hidden = (!self.hidden.is_empty()).then(|| Warning::Hidden(self.hidden.clone()));
+        let hidden = (!self.hidden.is_empty()).then(|| MeasureWarning::Hidden(self.hidden.clone()));
         let shared: Vec<Spur> = self.spurs.iter().filter(|spur| is_shared(spur)).cloned().collect();
         let all = [
-            (clipped > 0).then_some(Warning::Clipped { clipped, samples }),
-            (left_out > 0).then_some(Warning::LeftOut { left_out, samples }),
+            (clipped > 0).then_some(MeasureWarning::Clipped { clipped, samples }),
+            (left_out > 0).then_some(MeasureWarning::LeftOut { left_out, samples }),
             hidden,
-            (!shared.is_empty()).then_some(Warning::Shared(shared)),
-            self.unsettled_ends.map(Warning::Unsettled),
+            (!shared.is_empty()).then_some(MeasureWarning::Shared(shared)),
+            self.unsettled_ends.map(MeasureWarning::Unsettled),
         ];
         all.into_iter().flatten().collect()
     }

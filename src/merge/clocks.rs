@@ -1,7 +1,7 @@
 //! The instants of all samples on the clock of the first source, and their gains.
 
 use super::error::{MergeError, MergeWarning};
-use super::{Found, Source};
+use super::{Recorder, SourceEstimate};
 use crate::align::{AlignSettings, AlignWarning, Alignment, ClockCourse, align};
 use crate::calibrate::Record;
 use crate::instants::{
@@ -22,9 +22,9 @@ const REACH: usize = 16;
 const KEPT: f64 = 0.45;
 
 /// Recordings with their clocks, in periods of the output.
-pub(super) struct Placed {
+pub(super) struct Clocked {
     pub(super) recordings: Vec<Recording>,
-    pub(super) found: Vec<Found>,
+    pub(super) found: Vec<SourceEstimate>,
     pub(super) gains: Vec<f64>,
     /// Relative to the gains.
     pub(super) gain_deviations: Vec<f64>,
@@ -39,11 +39,15 @@ pub(super) struct Placed {
 ///
 /// # Errors
 /// [`MergeError`].
-pub(super) fn placed(sources: &[Source], rate: Hertz, within: Option<Seconds>) -> Result<Placed, MergeError> {
+pub(super) fn placed(
+    sources: &[Recorder],
+    rate: Hertz,
+    within: Option<Seconds>,
+) -> Result<Clocked, MergeError> {
     if let Some(flat) = sources.iter().find(|source| is_flat(&source.record)) {
         return Err(MergeError::NoSignal { name: flat.name.clone() });
     }
-    let has_stamps = |source: &&Source| source.stamps.is_some();
+    let has_stamps = |source: &&Recorder| source.stamps.is_some();
     match (sources.iter().find(has_stamps), sources.iter().find(|source| !has_stamps(source))) {
         (Some(stamped), Some(plain)) => {
             Err(MergeError::SomeStamps { stamped: stamped.name.clone(), plain: plain.name.clone() })
@@ -74,14 +78,14 @@ fn recording(samples: &[f64], clock: Clock, number: usize, level: f64) -> Record
     Recording::new(samples.iter().map(|x| x - level).collect(), clock, number)
 }
 
-fn plain(start: Seconds) -> Found {
-    Found { start, drift: None, gain: None, noise: 0.0, steps: Vec::new() }
+fn plain(start: Seconds) -> SourceEstimate {
+    SourceEstimate { start, drift: None, gain: None, noise: 0.0, steps: Vec::new() }
 }
 
-fn alone(source: &Source, rate: Hertz) -> Placed {
+fn alone(source: &Recorder, rate: Hertz) -> Clocked {
     let (samples, level) = usable(&source.record);
     let clock = Clock::even(FastPeriods(0.0), FastPeriods(rate.0 / source.rate.0));
-    Placed {
+    Clocked {
         recordings: vec![recording(&samples, clock, 0, level)],
         found: vec![plain(Seconds(0.0))],
         gains: vec![1.0],
@@ -92,8 +96,8 @@ fn alone(source: &Source, rate: Hertz) -> Placed {
     }
 }
 
-fn by_stamps(sources: &[Source], rate: Hertz) -> Result<Placed, MergeError> {
-    let stamps = |source: &Source| source.stamps.clone().unwrap_or_default();
+fn by_stamps(sources: &[Recorder], rate: Hertz) -> Result<Clocked, MergeError> {
+    let stamps = |source: &Recorder| source.stamps.clone().unwrap_or_default();
     let origin = stamps(&sources[0]).first().copied().unwrap_or(Seconds(0.0));
     let level = usable(&sources[0].record).1;
     let (mut recordings, mut found) = (Vec::new(), Vec::new());
@@ -107,7 +111,7 @@ fn by_stamps(sources: &[Source], rate: Hertz) -> Result<Placed, MergeError> {
         found.push(plain(stamps.first().map_or(Seconds(0.0), |first| *first - origin)));
     }
     let count = sources.len();
-    Ok(Placed {
+    Ok(Clocked {
         recordings,
         found,
         gains: vec![1.0; count],
@@ -118,7 +122,7 @@ fn by_stamps(sources: &[Source], rate: Hertz) -> Result<Placed, MergeError> {
     })
 }
 
-fn by_alignment(sources: &[Source], rate: Hertz, within: Option<Seconds>) -> Result<Placed, MergeError> {
+fn by_alignment(sources: &[Recorder], rate: Hertz, within: Option<Seconds>) -> Result<Clocked, MergeError> {
     let own = sources[0].rate;
     let records: Vec<Record> = sources.iter().map(|source| at_rate(source, own)).collect::<Result<_, _>>()?;
     // The spec counts in samples.
@@ -128,12 +132,12 @@ fn by_alignment(sources: &[Source], rate: Hertz, within: Option<Seconds>) -> Res
     let ratio = rate.0 / own.0;
     let (mut recordings, mut found) = (Vec::new(), Vec::new());
     for (number, source) in sources.iter().enumerate() {
-        let Place { clock, samples } = place(source, &alignment, number, own, ratio);
+        let ClockedSamples { clock, samples } = place(source, &alignment, number, own, ratio);
         let channel = alignment.channels[number];
         let begin = clock.at(0.0);
         let offset = if number == 0 { level } else { channel.offset.value + channel.gain.value * level };
         recordings.push(recording(&samples, clock, number, offset));
-        found.push(Found {
+        found.push(SourceEstimate {
             start: Seconds(begin.0 / rate.0),
             drift: Some(channel.drift),
             gain: Some(channel.gain),
@@ -153,7 +157,7 @@ fn by_alignment(sources: &[Source], rate: Hertz, within: Option<Seconds>) -> Res
         )
     };
     let warnings = alignment.warnings.iter().filter(|warning| !is_of_fixed(warning)).cloned();
-    Ok(Placed {
+    Ok(Clocked {
         recordings,
         found,
         gains: gains.iter().map(|gain| gain.value).collect(),
@@ -171,13 +175,13 @@ fn usual_deviation(course: &ClockCourse, count: usize) -> f64 {
     all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
 
-struct Place {
+struct ClockedSamples {
     clock: Clock,
     samples: Vec<f64>,
 }
 
 /// The clock of a source in periods of the output, and its samples without those amid a step.
-fn place(source: &Source, alignment: &Alignment, number: usize, own: Hertz, ratio: f64) -> Place {
+fn place(source: &Recorder, alignment: &Alignment, number: usize, own: Hertz, ratio: f64) -> ClockedSamples {
     let course = alignment.instants(number);
     let (mut samples, _) = usable(&source.record);
     let stretch = if is_same(source.rate, own) { 1.0 } else { own.0 / source.rate.0 };
@@ -197,7 +201,7 @@ fn place(source: &Source, alignment: &Alignment, number: usize, own: Hertz, rati
     let instant = |k: &usize| (*k as f64, FastPeriods(course.at(*k as f64 * stretch) * ratio));
     let even = || Clock::even(FastPeriods(course.at(0.0) * ratio), FastPeriods(ratio * stretch));
     // Only steps back in time could spoil a clock, and no recorder makes them.
-    Place { clock: Clock::through(knots.iter().map(instant)).unwrap_or_else(|_| even()), samples }
+    ClockedSamples { clock: Clock::through(knots.iter().map(instant)).unwrap_or_else(|_| even()), samples }
 }
 
 fn is_same(one: Hertz, other: Hertz) -> bool {
@@ -205,7 +209,7 @@ fn is_same(one: Hertz, other: Hertz) -> bool {
 }
 
 /// The record at the rate `own`, to be compared.
-fn at_rate(source: &Source, own: Hertz) -> Result<Record, MergeError> {
+fn at_rate(source: &Recorder, own: Hertz) -> Result<Record, MergeError> {
     if is_same(source.rate, own) {
         return Ok(source.record.clone());
     }

@@ -12,12 +12,12 @@ mod tracked;
 pub use error::{MergeError, MergeWarning};
 pub use tracked::{DelayTrack, Tracked, fuse_stamped, fuse_tracked};
 
-use crate::align::Step;
+use crate::align::ClockStep;
 use crate::calibrate::Record;
 use crate::instants::{Fused, FusionSettings, Model, Prior, Recording, fuse};
 use crate::sine_fit::Estimate;
 use crate::units::{CyclesPerFastPeriod, Decibels, FastPeriods, Hertz, Seconds};
-use clocks::Placed;
+use clocks::Clocked;
 
 /// Passes in which the spectrum is learned; a third gains nothing.
 const PASSES: usize = 2;
@@ -32,7 +32,7 @@ const LEAST_GAIN: Decibels = Decibels(0.5);
 
 /// What one recorder or logger delivered.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Source {
+pub struct Recorder {
     /// Its name in messages.
     pub name: String,
     /// The samples; of clipped and lost ones nothing is used.
@@ -71,7 +71,7 @@ pub struct Merged {
     /// Its instant after the first sample of that source.
     pub begin: Seconds,
     /// What was found of each source.
-    pub sources: Vec<Found>,
+    pub sources: Vec<SourceEstimate>,
     /// The predicted quality.
     pub quality: Quality,
     /// What a reader must know.
@@ -80,7 +80,7 @@ pub struct Merged {
 
 /// What was found of a source.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct SourceEstimate {
     /// When its first sample was taken, after the first one of the first source.
     pub start: Seconds,
     /// By how much its clock is fast; none with stamps.
@@ -90,7 +90,7 @@ pub struct Found {
     /// Rms of its noise, with all that recorders do not have in common.
     pub noise: f64,
     /// Where it lost samples.
-    pub steps: Vec<Step>,
+    pub steps: Vec<ClockStep>,
 }
 
 /// The predicted signal-to-noise ratios.
@@ -119,13 +119,13 @@ impl Quality {
 ///
 /// # Errors
 /// [`MergeError`].
-pub fn merge(sources: &[Source], settings: MergeSettings) -> Result<Merged, MergeError> {
+pub fn merge(sources: &[Recorder], settings: MergeSettings) -> Result<Merged, MergeError> {
     let rate = output_rate(sources, settings)?;
-    let Placed { recordings, found, gains, gain_deviations, delay_deviations, level, mut warnings } =
+    let Clocked { recordings, found, gains, gain_deviations, delay_deviations, level, mut warnings } =
         clocks::placed(sources, rate, settings.within)?;
     let (first, grid) = grid(sources, &recordings, rate)?;
     check_memory(grid.count)?;
-    let step_noise = |source: &Source| source.step * source.step / 12.0;
+    let step_noise = |source: &Recorder| source.step * source.step / 12.0;
     let prior = Prior {
         band: settings.band.map(|band| CyclesPerFastPeriod((band.0 / rate.0).min(0.5))),
         passes: if settings.learn { PASSES } else { 0 },
@@ -137,7 +137,7 @@ pub fn merge(sources: &[Source], settings: MergeSettings) -> Result<Merged, Merg
     let model = Model::learn(&recordings, &prior, grid)?;
     let fused = fuse(&model.estimator, &recordings, grid)?;
     let quality = quality(&model, &fused, &recordings, grid, rate)?;
-    let noise = |(found, noise): (Found, &f64)| Found { noise: noise.sqrt(), ..found };
+    let noise = |(found, noise): (SourceEstimate, &f64)| SourceEstimate { noise: noise.sqrt(), ..found };
     warnings.extend(sources.iter().filter_map(clipped));
     let sources = found.into_iter().zip(&model.noise).map(noise).collect();
     let samples = fused.samples.iter().map(|x| x + level).collect();
@@ -145,12 +145,12 @@ pub fn merge(sources: &[Source], settings: MergeSettings) -> Result<Merged, Merg
     Ok(Merged { samples, rate, first, begin, sources, quality, warnings })
 }
 
-fn clipped(source: &Source) -> Option<MergeWarning> {
+fn clipped(source: &Recorder) -> Option<MergeWarning> {
     let clipped = source.record.clipped;
     (clipped > 0).then(|| MergeWarning::Clipped { name: source.name.clone(), clipped })
 }
 
-fn output_rate(sources: &[Source], settings: MergeSettings) -> Result<Hertz, MergeError> {
+fn output_rate(sources: &[Recorder], settings: MergeSettings) -> Result<Hertz, MergeError> {
     let first = sources.first().ok_or(MergeError::NoSources)?.rate;
     let sum: f64 = sources.iter().map(|source| source.rate.0).sum();
     // Stated rates are rounded.
@@ -165,7 +165,7 @@ fn output_rate(sources: &[Source], settings: MergeSettings) -> Result<Hertz, Mer
 
 /// The first sample of the first source that all have in common, and the outputs from there on.
 fn grid(
-    sources: &[Source],
+    sources: &[Recorder],
     recordings: &[Recording],
     rate: Hertz,
 ) -> Result<(usize, FusionSettings), MergeError> {

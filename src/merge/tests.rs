@@ -1,6 +1,6 @@
 //! Recordings of sums of cosines, which are exact at any instant.
 
-use super::{MergeError, MergeSettings, Merged, Source, merge};
+use super::{MergeError, MergeSettings, Merged, Recorder, merge};
 use crate::calibrate::Record;
 use crate::random::Random;
 use crate::units::{Hertz, Seconds};
@@ -17,10 +17,10 @@ fn sound(t: f64) -> f64 {
     0.02 * (0..120).map(line).sum::<f64>()
 }
 
-fn source(name: &str, gain: f64, instants: impl Iterator<Item = f64>, seed: u64) -> Source {
+fn source(name: &str, gain: f64, instants: impl Iterator<Item = f64>, seed: u64) -> Recorder {
     let mut random = Random(seed);
     let samples = instants.map(|t| gain * sound(t) + 2e-5 * random.sample()).collect();
-    Source {
+    Recorder {
         name: name.to_owned(),
         record: Record::new(samples),
         rate: Hertz(4000.0),
@@ -75,7 +75,7 @@ fn stamps_say_when_samples_were_taken() {
         merged.quality
     );
 
-    let plain = Source { stamps: None, name: "plain".into(), ..logger.clone() };
+    let plain = Recorder { stamps: None, name: "plain".into(), ..logger.clone() };
     let refused = merge(&[logger.clone(), plain], SETTINGS).unwrap_err();
     assert!(matches!(refused, MergeError::SomeStamps { .. }), "{refused}");
     let rate = MergeSettings { rate: Some(Hertz(1e9)), ..SETTINGS };

@@ -155,7 +155,7 @@ mod tests {
 
     fn bank() -> Bank {
         let spec = Spec::from_toml(SPEC, "test").unwrap();
-        design::design(&spec, &design::Options::without_proof()).unwrap().bank
+        design::design(&spec, &design::DesignOptions::without_proof()).unwrap().bank
     }
 
     /// What passes the Butterworth filter, which both converters and the target have: tones.

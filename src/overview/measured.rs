@@ -77,7 +77,7 @@ pub fn causes(spur: &Spur) -> String {
 ///
 /// ```
 /// use hybank::bank::{Bank, SynthesisFilters};
-/// use hybank::overview::{BeforeAfter, Drawn, column, spur_chart};
+/// use hybank::overview::{BeforeAfter, DrawnRecording, column, spur_chart};
 /// use hybank::{measure::Settings, units::Hertz};
 /// // Two time-interleaved converters, the second one with a gain of 0.9, and a bank that corrects it.
 /// let bank = Bank::bare(SynthesisFilters::Fir(vec![vec![1.0, 0.0], vec![0.0, 1.0 / 0.9]]), 2);
@@ -86,7 +86,7 @@ pub fn causes(spur: &Spur) -> String {
 /// let both = BeforeAfter::of(&bank, Hertz(48e3), &captures, &signal, Vec::new())?;
 /// assert!(both.before.sinad.0 < 30.0 && both.after.sinad.0 > 200.0);
 /// assert_eq!(column(&both.after)[0].name, "SINAD");
-/// let drawn = Drawn { label: "fused", measurement: Some(&both.after), comparison: None };
+/// let drawn = DrawnRecording { label: "fused", measurement: Some(&both.after), comparison: None };
 /// let chart = spur_chart(drawn, &Settings::default(), || unreachable!("it is measured"));
 /// assert_eq!(chart.series[0].label, "fused");
 /// # Ok::<(), hybank::overview::Unmeasured>(())

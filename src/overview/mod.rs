@@ -26,7 +26,7 @@ mod understood;
 pub use facts::{ChannelFact, Facts, uselessness, warnings};
 pub use measured::{BeforeAfter, Figure, Unmeasured, causes, column};
 pub use pictures::{Picture, pictures};
-pub use spur_chart::{Drawn, before_after, spectra, spur_chart};
+pub use spur_chart::{DrawnRecording, before_after, spectra, spur_chart};
 pub use terms::{Fact, band, figure_facts, key_figures, rounded as decibels_of};
 pub use text::{decibels, frequency, six_digits};
 pub use understood::understood;

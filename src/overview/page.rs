@@ -46,7 +46,7 @@ pub enum PageError {
 
 /// What the page shows of captures.
 pub struct CapturesOnPage {
-    spectra: Figure,
+    spectra: CaptionedChart,
     /// Of the tone that they hold.
     measured: Option<BeforeAfter>,
 }
@@ -86,7 +86,7 @@ impl CapturesOnPage {
             Ok(measured) => {
                 let chart = before_after(&measured.before, &measured.after);
                 let caption = format!("{what} Each cause of spurs has one colour.");
-                (Figure::new(&chart, &caption), Some(measured))
+                (CaptionedChart::new(&chart, &caption), Some(measured))
             }
             Err(reason) => {
                 let plain = interleaved(&bank.sample_delays(), bank.ratio, bank.wait(), &channels);
@@ -95,7 +95,7 @@ impl CapturesOnPage {
                     "{what} Lines that only the first has are images of the signal: errors of the converters' \
                      instants and filters. No tone was measured ({reason})."
                 );
-                (Figure::new(&chart, &caption), None)
+                (CaptionedChart::new(&chart, &caption), None)
             }
         };
         Ok(Self { spectra: spectra?, measured })
@@ -163,12 +163,12 @@ pre { background: #f5f5f5; padding: 0.8rem; overflow-x: auto; font-size: 0.85rem
 ";
 
 /// A chart in the page.
-struct Figure {
+struct CaptionedChart {
     svg: String,
     caption: String,
 }
 
-impl Figure {
+impl CaptionedChart {
     fn new(chart: &Chart, caption: &str) -> Result<Self, PlotError> {
         Ok(Self { svg: chart.to_svg()?, caption: caption.to_owned() })
     }
@@ -182,7 +182,7 @@ impl Figure {
 /// All that the page shows.
 pub struct Page {
     facts: Facts,
-    figures: Vec<Figure>,
+    figures: Vec<CaptionedChart>,
     captures: Option<CapturesOnPage>,
     /// TOML.
     spec: String,
@@ -197,7 +197,7 @@ impl Page {
         let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
         let mut figures = Vec::new();
         for picture in pictures(bank)? {
-            figures.push(Figure::new(&picture.chart, picture.caption)?);
+            figures.push(CaptionedChart::new(&picture.chart, picture.caption)?);
         }
         Ok(Self { facts: Facts::new(bank, spec)?, figures, captures, spec: spec.to_toml()? })
     }
@@ -238,7 +238,7 @@ impl Page {
             cost = facts(cost),
             channels = channel_table(channels),
             captures = captures.unwrap_or_default(),
-            pictures = self.figures.iter().map(Figure::html).collect::<String>(),
+            pictures = self.figures.iter().map(CaptionedChart::html).collect::<String>(),
             spec = escaped(&self.spec),
             commands = escaped(&commands.join("\n")),
             version = env!("CARGO_PKG_VERSION"),

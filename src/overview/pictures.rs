@@ -3,7 +3,7 @@
 use crate::bank::Bank;
 use crate::design::responses::{analysis_gains, fir_response, front_end_gains, impulse_responses};
 use crate::design::{self, DesignError, norm_at};
-use crate::figures::{Tone, tone_curve};
+use crate::figures::{ToneOutput, tone_curve};
 use crate::linalg::Complex;
 use crate::plot::{AxisScale, Chart, Series};
 use crate::quantity::scale_of;
@@ -89,7 +89,7 @@ pub fn pictures(bank: &Bank) -> Result<Vec<Picture>, DesignError> {
 fn tones(bank: &Bank) -> Result<Chart, DesignError> {
     let tones = tone_curve(bank, POINTS)?;
     let (factor, x_label) = axis(tones.last().map_or(Hertz(1.0), |(hertz, _)| *hertz));
-    let curve = |label: &str, of: fn(&Tone) -> f64| Series {
+    let curve = |label: &str, of: fn(&ToneOutput) -> f64| Series {
         label: label.into(),
         points: tones.iter().map(|(hertz, tone)| (hertz.0 * factor, decibels(of(tone)))).collect(),
     };

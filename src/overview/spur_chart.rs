@@ -1,6 +1,6 @@
 //! The spectra of recordings, of measured ones with their spurs marked.
 
-use crate::measure::{Cause, Comparison, Measurement, Settings, Spectrum, Spur, Window};
+use crate::measure::{Cause, Comparison, Measurement, RecordSpectrum, Settings, Spur, Window};
 use crate::plot::{Chart, Marks, Series};
 use crate::quantity::scale_of;
 use crate::units::{Decibels, Hertz};
@@ -14,7 +14,7 @@ const DEPTH_DB: f64 = 180.0;
 
 /// A recording whose spectrum is drawn.
 #[derive(Debug, Clone, Copy)]
-pub struct Drawn<'a> {
+pub struct DrawnRecording<'a> {
     /// Its name.
     pub label: &'a str,
     /// Its figures, if it was measured; their spectrum is drawn.
@@ -25,7 +25,11 @@ pub struct Drawn<'a> {
 
 /// The chart of a recording, with marks at its spurs. `spectrum` is that of the recording, if it was not
 /// measured.
-pub fn spur_chart(drawn: Drawn<'_>, settings: &Settings, spectrum: impl FnOnce() -> Spectrum) -> Chart {
+pub fn spur_chart(
+    drawn: DrawnRecording<'_>,
+    settings: &Settings,
+    spectrum: impl FnOnce() -> RecordSpectrum,
+) -> Chart {
     let own;
     let spectrum = match drawn.measurement {
         Some(measured) => &measured.spectrum,
@@ -44,7 +48,7 @@ pub fn spur_chart(drawn: Drawn<'_>, settings: &Settings, spectrum: impl FnOnce()
     Chart { marks, ..scale.chart(title(drawn), settings.window, series) }
 }
 
-fn title(drawn: Drawn<'_>) -> String {
+fn title(drawn: DrawnRecording<'_>) -> String {
     match (drawn.measurement, drawn.comparison) {
         (Some(m), _) => {
             format!("SINAD {:.2} dB, ENOB {:.2} bits, SFDR {:.2} dBc", m.sinad.0, m.enob, m.sfdr.0)
@@ -77,7 +81,7 @@ pub fn before_after(before: &Measurement, after: &Measurement) -> Chart {
 /// The spectra of recordings of the rate `rate`, each with its name.
 pub fn spectra(rate: Hertz, recordings: &[(&str, &[f64])]) -> Chart {
     let window = Window::Bh7;
-    let spectra: Vec<_> = recordings.iter().map(|(_, x)| Spectrum::new(x, rate, window)).collect();
+    let spectra: Vec<_> = recordings.iter().map(|(_, x)| RecordSpectrum::new(x, rate, window)).collect();
     let scale = Scale::of(&spectra, 1.0);
     let series = recordings.iter().zip(&spectra);
     let series = series.map(|(&(label, _), of)| Series { label: label.into(), points: scale.points(of) });
@@ -102,7 +106,7 @@ struct Scale {
 }
 
 impl Scale {
-    fn of<'a>(spectra: impl IntoIterator<Item = &'a Spectrum> + Clone, full_scale: f64) -> Self {
+    fn of<'a>(spectra: impl IntoIterator<Item = &'a RecordSpectrum> + Clone, full_scale: f64) -> Self {
         let ends = spectra.clone().into_iter().map(|of| of.frequency(of.amplitudes.len()).0);
         let end = ends.fold(0.0, f64::max);
         // Below 1 kHz the unit is hertz.
@@ -122,7 +126,7 @@ impl Scale {
     }
 
     /// The largest bin of each column.
-    fn points(&self, spectrum: &Spectrum) -> Vec<(f64, f64)> {
+    fn points(&self, spectrum: &RecordSpectrum) -> Vec<(f64, f64)> {
         let point = |(frequency, amplitude): (Hertz, f64)| (frequency.0 * self.factor, self.level(amplitude));
         spectrum.columns(COLUMNS).into_iter().map(point).collect()
     }

@@ -31,7 +31,7 @@ const EXACT: Decibels = Decibels(270.0);
 /// Signal-to-noise ratio, images, error of gain, and the simple ways. In normalised time frequencies are
 /// shares of the output rate.
 pub fn figure_facts(figures: &Figures, is_normalised: bool) -> [Fact; 4] {
-    let words = Words { figures, is_normalised };
+    let words = FigureTerms { figures, is_normalised };
     [
         fact("SNR", ratio(figures.snr.total_db), words.snr()),
         words.image(),
@@ -84,12 +84,12 @@ fn with_ratio(figure: &SimpleFigure) -> String {
     format!("{} ({})", named(figure), ratio(figure.snr_db))
 }
 
-struct Words<'a> {
+struct FigureTerms<'a> {
     figures: &'a Figures,
     is_normalised: bool,
 }
 
-impl Words<'_> {
+impl FigureTerms<'_> {
     fn hertz(&self, hertz: Hertz) -> String {
         frequency(hertz, self.is_normalised)
     }

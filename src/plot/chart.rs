@@ -2,7 +2,7 @@
 
 use super::axis::{AxisScale, Labels, extent, widened};
 use super::labels::{MARK_FONT, RADIUS, Room};
-use super::legend::{Dashes, Entry, Legend, Look, OVERSIZE, letters};
+use super::legend::{Dashes, Legend, LegendEntry, Look, OVERSIZE, letters};
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
@@ -55,7 +55,7 @@ type Axes<'a, B, X> = ChartContext<'a, B, Cartesian2d<X, RangedCoordf64>>;
 /// The ranges of both axes.
 type Ranges = (Range<f64>, Range<f64>);
 
-type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
+type DrawnSeries<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 
 /// Curves over a common axis.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -146,8 +146,8 @@ impl Chart {
         (0..self.series.len()).map(|k| Look::Line(dashes_over(covered(k)))).collect()
     }
 
-    fn entries<'a>(&'a self, looks: &'a [Look]) -> impl Iterator<Item = Entry<'a>> {
-        let line = |((series, look), colour): ((&'a Series, &Look), &RGBColor)| Entry {
+    fn entries<'a>(&'a self, looks: &'a [Look]) -> impl Iterator<Item = LegendEntry<'a>> {
+        let line = |((series, look), colour): ((&'a Series, &Look), &RGBColor)| LegendEntry {
             label: &series.label,
             look: *look,
             style: line_style(colour),
@@ -156,7 +156,7 @@ impl Chart {
         let marks = &self.marks;
         let is_first = |k: usize| !marks[..k].iter().any(|earlier| earlier.label == marks[k].label);
         let points = self.styled().enumerate().filter(move |(k, _)| is_first(*k));
-        lines.chain(points.map(|(_, (marks, style))| Entry {
+        lines.chain(points.map(|(_, (marks, style))| LegendEntry {
             label: &marks.label,
             look: Look::Points,
             style,
@@ -171,7 +171,7 @@ impl Chart {
         })
     }
 
-    fn draw<B: DrawingBackend>(&self, backend: B, (x, y): Ranges) -> Drawn<B> {
+    fn draw<B: DrawingBackend>(&self, backend: B, (x, y): Ranges) -> DrawnSeries<B> {
         let root = backend.into_drawing_area();
         root.fill(&WHITE)?;
         let looks = self.looks(y.end - y.start);
@@ -198,13 +198,17 @@ impl Chart {
         Ok(())
     }
 
-    fn draw_on<B: DrawingBackend, X: Across>(&self, mut chart: Axes<'_, B, X>, looks: &[Look]) -> Drawn<B> {
+    fn draw_on<B: DrawingBackend, X: Across>(
+        &self,
+        mut chart: Axes<'_, B, X>,
+        looks: &[Look],
+    ) -> DrawnSeries<B> {
         self.draw_axes(&mut chart)?;
         self.draw_lines(&mut chart, looks)?;
         self.draw_marks(&mut chart)
     }
 
-    fn draw_axes<B: DrawingBackend, X: Across>(&self, chart: &mut Axes<'_, B, X>) -> Drawn<B> {
+    fn draw_axes<B: DrawingBackend, X: Across>(&self, chart: &mut Axes<'_, B, X>) -> DrawnSeries<B> {
         let across = match self.x_scale {
             AxisScale::Linear => Labels::over(&chart.x_range()),
             AxisScale::Decades => Labels::OfDecades,
@@ -227,7 +231,7 @@ impl Chart {
         &self,
         chart: &mut Axes<'_, B, X>,
         looks: &[Look],
-    ) -> Drawn<B> {
+    ) -> DrawnSeries<B> {
         for ((series, look), colour) in self.series.iter().zip(looks).zip(COLOURS.iter().cycle()) {
             let points = series.points.iter().copied().filter(|(x, y)| self.is_drawn(*x, *y));
             let style = line_style(colour);
@@ -243,7 +247,7 @@ impl Chart {
 
     /// Circles with their texts beside them, where these cover neither each other nor a circle. A text for
     /// which there is no room is left out.
-    fn draw_marks<B: DrawingBackend, X: Across>(&self, chart: &mut Axes<'_, B, X>) -> Drawn<B> {
+    fn draw_marks<B: DrawingBackend, X: Across>(&self, chart: &mut Axes<'_, B, X>) -> DrawnSeries<B> {
         let text_style = TextStyle::from(text(MARK_FONT)).color(&RGBColor(60, 60, 60));
         let (across, down) = chart.plotting_area().get_pixel_range();
         let mut room = Room::new(across, down);

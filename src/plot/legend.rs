@@ -32,13 +32,13 @@ pub(super) enum Look {
 }
 
 /// One line of the legend.
-pub(super) struct Entry<'a> {
+pub(super) struct LegendEntry<'a> {
     pub(super) label: &'a str,
     pub(super) look: Look,
     pub(super) style: ShapeStyle,
 }
 
-impl Entry<'_> {
+impl LegendEntry<'_> {
     fn width(&self) -> i32 {
         SAMPLE + 3 * GAP + (f64::from(FONT) * LETTER * self.label.chars().count() as f64) as i32
     }
@@ -46,15 +46,15 @@ impl Entry<'_> {
 
 /// Entries with their places, and the rows they take.
 pub(super) struct Legend<'a> {
-    entries: Vec<(Entry<'a>, (i32, i32))>,
+    entries: Vec<(LegendEntry<'a>, (i32, i32))>,
     rows: i32,
 }
 
 impl<'a> Legend<'a> {
     /// As many entries in a row of `width` pixels as have room there.
-    pub(super) fn new(entries: impl Iterator<Item = Entry<'a>>, width: i32) -> Self {
+    pub(super) fn new(entries: impl Iterator<Item = LegendEntry<'a>>, width: i32) -> Self {
         let (mut x, mut row) = (GAP, 0);
-        let mut place = |entry: Entry<'a>| {
+        let mut place = |entry: LegendEntry<'a>| {
             if x > GAP && x + entry.width() > width {
                 (x, row) = (GAP, row + 1);
             }
@@ -77,7 +77,7 @@ impl<'a> Legend<'a> {
         area: &DrawingArea<B, Shift>,
     ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
         let enlarged = |x: i32| x * OVERSIZE as i32;
-        for (Entry { label, look, style }, (x, y)) in &self.entries {
+        for (LegendEntry { label, look, style }, (x, y)) in &self.entries {
             let middle = enlarged(y + ROW / 2);
             let line = [(enlarged(*x), middle), (enlarged(x + SAMPLE), middle)];
             match look {

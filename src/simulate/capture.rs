@@ -1,6 +1,6 @@
 //! Analog signals, and the samples of the ideal fast converter.
 
-use super::recording::Recording;
+use super::recording::Periodic;
 use super::response::{Instants, sample};
 use super::source::NormalisedSource;
 use super::walk::sample_at;
@@ -14,7 +14,7 @@ pub enum Analog {
     /// Known in closed form.
     Known(NormalisedSource),
     /// A recording, periodic and band-limited.
-    Recorded(Recording),
+    Recorded(Periodic),
 }
 
 /// The reference samples (phi_0 * f)(n - m0), M per slow period, with the latency m0 of the problem without

@@ -18,7 +18,7 @@ use std::ops::Range;
 /// with independent normal numbers n_k and j_k of variance 1 and the quantiser q. The numbers depend on the
 /// seed, the channel and k only.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Converter {
+pub struct Sampler {
     /// The true delay minus D_i.
     pub delay_error: FastPeriods,
     /// Relative error of the gain.
@@ -48,7 +48,7 @@ pub struct Delivered {
     pub clipped: usize,
 }
 
-impl Converter {
+impl Sampler {
     /// Largest modulus of a jitter's random number: no sample is taken further than this times the rms from
     /// its instant.
     pub const MOST_SIGMAS: f64 = Normal::MOST;
@@ -79,8 +79,8 @@ impl Converter {
         self.capture_part(problem, channel, signal, level, periods, Purpose::Noise)
     }
 
-    /// As [`Converter::capture`], with noise of a purpose: of a complex signal the converters of both parts
-    /// have the same clock and front end, hence the same jitter, and noise of their own.
+    /// As [`Sampler::capture`], with noise of a purpose: of a complex signal the converters of
+    /// both parts have the same clock and front end, hence the same jitter, and noise of their own.
     pub(super) fn capture_part(
         &self,
         problem: &Problem,
@@ -152,7 +152,7 @@ pub struct Captured {
 /// Captures `periods` slow periods of `signal`, or frames: slow samples k = 0 .. periods of each channel, or
 /// so many times the samples that it has in a frame, and M times as many reference samples.
 pub fn capture(problem: &Problem, signal: &Analog, periods: usize) -> Captured {
-    let slow = |i| Converter::ideal().capture(problem, i, signal, 1.0, periods).samples;
+    let slow = |i| Sampler::ideal().capture(problem, i, signal, 1.0, periods).samples;
     let channels = (0..problem.converters().len()).map(slow).collect();
     Captured { channels, target: target(problem, signal, periods) }
 }
@@ -187,7 +187,7 @@ impl Quantiser {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::{Recording, Source, capture};
+    use crate::simulate::{Periodic, Source, capture};
     use crate::spec::Spec;
     use crate::units::Seconds;
     use std::f64::consts::TAU;
@@ -224,19 +224,19 @@ mod tests {
         let signal = tone(0.7);
         let want = capture(&problem(), &signal, 50);
         for (channel, want) in want.channels.iter().enumerate() {
-            let got = Converter::ideal().capture(&problem(), channel, &signal, 1.0, 50);
+            let got = Sampler::ideal().capture(&problem(), channel, &signal, 1.0, 50);
             assert_eq!((&got.samples, got.clipped), (want, 0));
         }
     }
 
     #[test]
     fn errors_of_delay_gain_offset_and_clock_have_their_closed_form() {
-        let converter = Converter {
+        let converter = Sampler {
             delay_error: FastPeriods(0.03),
             gain_error: 0.01,
             offset: -0.2,
             drift: 1e-4,
-            ..Converter::ideal()
+            ..Sampler::ideal()
         };
         let got = converter.capture(&problem(), 1, &tone(0.7), 3.0, 4000);
         for (k, x) in got.samples.iter().enumerate() {
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn noise_has_its_rms_and_is_white() {
-        let converter = Converter { noise: 0.003, seed: 5, ..Converter::ideal() };
+        let converter = Sampler { noise: 0.003, seed: 5, ..Sampler::ideal() };
         let count = 200_000;
         let captured: Vec<Vec<f64>> =
             (0..2).map(|i| converter.capture(&problem(), i, &tone(0.7), 0.0, count).samples).collect();
@@ -268,9 +268,9 @@ mod tests {
     #[test]
     fn jitter_has_the_snr_of_its_formula() {
         for (omega, sigma) in [(0.3, 0.01), (1.1, 0.003), (2.5, 1e-5)] {
-            let converter = Converter { jitter: FastPeriods(sigma), seed: 9, ..Converter::ideal() };
+            let converter = Sampler { jitter: FastPeriods(sigma), seed: 9, ..Sampler::ideal() };
             let count = 100_000;
-            let [ideal, jittered] = [Converter::ideal(), converter]
+            let [ideal, jittered] = [Sampler::ideal(), converter]
                 .map(|c| c.capture(&problem(), 0, &tone(omega), 1.0, count).samples);
             let error = rms(differences(&ideal, &jittered));
             let snr = 20.0 * (rms(ideal.iter().copied()) / error).log10();
@@ -284,14 +284,14 @@ mod tests {
         let omega = TAU * (5f64.sqrt() - 1.0) / 4.0;
         let full_scale = (1.0 - 0.5f64.powi(12)) * (omega * omega + 0.25) / 0.25;
         let capture = |quantiser| {
-            let converter = Converter { quantiser, ..Converter::ideal() };
+            let converter = Sampler { quantiser, ..Sampler::ideal() };
             converter.capture(&problem(), 0, &tone(omega), full_scale, 100_000)
         };
         let (ideal, rounded) = (capture(None), capture(Quantiser::new(12)));
         let error = rms(differences(&ideal.samples, &rounded.samples));
         let snr = 20.0 * (rms(ideal.samples.iter().copied()) / error).log10();
         assert!((snr - (6.0206 * 12.0 + 1.7609)).abs() < 0.05, "{snr}");
-        let clipped = Converter { quantiser: Quantiser::new(12), ..Converter::ideal() };
+        let clipped = Sampler { quantiser: Quantiser::new(12), ..Sampler::ideal() };
         let clipped = clipped.capture(&problem(), 0, &tone(omega), 2.0 * full_scale, 30_000).clipped;
         // A sine of twice the full scale is beyond it for two thirds of its period.
         assert!((clipped as f64 / 30_000.0 - 2.0 / 3.0).abs() < 1e-3, "{clipped}");
@@ -305,12 +305,11 @@ mod tests {
         let recorded: Vec<f64> = (0..length).map(|n| (omega * f64::from(n)).cos()).collect();
         for (signal, omega) in [
             (tone(omega), omega),
-            (Analog::Recorded(Recording::new(&recorded, FastPeriods(1.0))), omega),
-            (Analog::Recorded(Recording::new(&recorded, FastPeriods(0.4))), omega / 0.4),
-            (Analog::Recorded(Recording::new(&recorded, FastPeriods(2.5))), omega / 2.5),
+            (Analog::Recorded(Periodic::new(&recorded, FastPeriods(1.0))), omega),
+            (Analog::Recorded(Periodic::new(&recorded, FastPeriods(0.4))), omega / 0.4),
+            (Analog::Recorded(Periodic::new(&recorded, FastPeriods(2.5))), omega / 2.5),
         ] {
-            let converter =
-                Converter { jitter: FastPeriods(0.1), drift: -3e-5, seed: 2, ..Converter::ideal() };
+            let converter = Sampler { jitter: FastPeriods(0.1), drift: -3e-5, seed: 2, ..Sampler::ideal() };
             let shifts = converter.shifts(0, 300).unwrap();
             let got = converter.capture(&problem(), 0, &signal, 1.0, 300).samples;
             for (k, x) in got.iter().enumerate() {
@@ -322,13 +321,13 @@ mod tests {
 
     #[test]
     fn samples_depend_on_seed_channel_and_number_only() {
-        let converter = Converter { jitter: FastPeriods(0.01), noise: 0.1, seed: 3, ..Converter::ideal() };
-        let capture = |converter: Converter, channel, periods| {
+        let converter = Sampler { jitter: FastPeriods(0.01), noise: 0.1, seed: 3, ..Sampler::ideal() };
+        let capture = |converter: Sampler, channel, periods| {
             converter.capture(&problem(), channel, &tone(0.4), 1.0, periods).samples
         };
         let long = capture(converter, 1, 500);
         assert_eq!(capture(converter, 1, 200), long[..200]);
-        assert_ne!(capture(Converter { seed: 4, ..converter }, 1, 200), long[..200]);
+        assert_ne!(capture(Sampler { seed: 4, ..converter }, 1, 200), long[..200]);
         assert_ne!(capture(converter, 0, 200), long[..200]);
     }
 

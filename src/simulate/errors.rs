@@ -1,8 +1,8 @@
 //! How the virtual converters of a spec differ from what it says, with the limits of that.
 
-use super::{Analog, Converter, Quantiser};
+use super::{Analog, Quantiser, Sampler};
 use crate::design::uncertainty::{Refused, of};
-use crate::quantity::Time;
+use crate::quantity::WrittenTime;
 use crate::spec::{
     ChannelCount, ChannelSpec, Cutoff, Fitting, MAX_LATENCY, Spec, SpecProblem, check_noise, check_offset,
     for_channels, within,
@@ -21,27 +21,27 @@ const MOST_CUTOFF_ERROR: f64 = 0.5;
 /// How converters differ from what a spec says. A list has no value, one for all channels, or one for each.
 ///
 /// ```
-/// use hybank::simulate::ConverterErrors;
+/// use hybank::simulate::ErrorLists;
 /// use hybank::spec::Spec;
 /// let spec = Spec::from_toml(include_str!("../../filters/speech-2x.toml"), "spec.toml")?;
-/// let errors = ConverterErrors { bits: Some(12), gain_error: vec![0.01], ..Default::default() };
+/// let errors = ErrorLists { bits: Some(12), gain_error: vec![0.01], ..Default::default() };
 /// let converters = errors.converters(&spec, std::iter::empty())?;
 /// assert_eq!((converters.len(), converters[1].errors.gain), (2, 0.01));
 /// # Ok::<_, Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct ConverterErrors {
+pub struct ErrorLists {
     /// White noise on every sample, rms relative to full scale.
     pub noise: f64,
     /// Samples are rounded to so many bits, 2 to 24, with full scale 1; those beyond it are clipped and
     /// counted.
     pub bits: Option<u32>,
     /// Aperture jitter: each sample is taken this much off its instant, rms.
-    pub jitter: Option<Time>,
+    pub jitter: Option<WrittenTime>,
     /// By how many parts per million the clocks are too fast.
     pub drift: Vec<f64>,
     /// True delays minus those of the spec.
-    pub delay_error: Vec<Time>,
+    pub delay_error: Vec<WrittenTime>,
     /// Relative errors of the gains.
     pub gain_error: Vec<f64>,
     /// Relative errors of the cut-offs of the front ends; of the stage that `fit` of the spec names, if it
@@ -74,10 +74,10 @@ pub struct VirtualConverter {
     /// What was asked for.
     pub errors: ErrorsOfConverter,
     /// The converter, with the offset of the spec.
-    pub converter: Converter,
+    pub converter: Sampler,
 }
 
-/// A field of [`ConverterErrors`] that is refused.
+/// A field of [`ErrorLists`] that is refused.
 pub type RefusedError = Refused<ErrorRule>;
 
 /// A rule for the errors of converters.
@@ -129,7 +129,7 @@ impl From<SpecProblem> for ErrorRule {
     }
 }
 
-impl ConverterErrors {
+impl ErrorLists {
     /// The converters of `spec` with these errors, for the parts of a signal.
     ///
     /// # Errors
@@ -163,7 +163,7 @@ impl ConverterErrors {
                 offset: offsets[i],
                 drift: drift[i],
             },
-            converter: Converter {
+            converter: Sampler {
                 delay_error: Seconds(delays[i]).in_fast_periods(spec.fast_period),
                 gain_error: gains[i],
                 offset: channel.offset + offsets[i],
@@ -214,7 +214,7 @@ fn check_jitter(rms: Seconds, fast_period: Seconds, signal: &Analog) -> Result<(
         return Err(ErrorRule::Jitter { rms, jitter });
     }
     let Analog::Recorded(recording) = signal else { return Ok(()) };
-    let (reach, most): (FastPeriods, _) = (jitter * Converter::MOST_SIGMAS, recording.most_shift());
+    let (reach, most): (FastPeriods, _) = (jitter * Sampler::MOST_SIGMAS, recording.most_shift());
     if reach <= most { Ok(()) } else { Err(ErrorRule::JitterOfRecording { reach, most }) }
 }
 

@@ -3,9 +3,9 @@
 //!
 //! Channel i captures (phi_i * f)(k M - D_i), time in fast periods. The response to an analytic [`Source`]
 //! is computed by closed forms, matrix exponentials and quadrature that is exact to rounding; the response
-//! to a [`Recording`] by Fourier synthesis. No time grid is involved, so the result at an instant does not
-//! depend on the other instants. A [`Converter`] adds errors of delay, gain, offset and clock, jitter, noise
-//! and rounding.
+//! to a [`Periodic`] by Fourier synthesis. No time grid is involved, so the result at an instant
+//! does not depend on the other instants. A [`Sampler`] adds errors of delay, gain, offset and
+//! clock, jitter, noise and rounding.
 
 mod capture;
 mod complex;
@@ -22,10 +22,10 @@ mod workload;
 
 pub use capture::{Analog, interleaved, target};
 pub use complex::ComplexSource;
-pub use converter::{Captured, Converter, Delivered, Quantiser, capture};
-pub use errors::{ConverterErrors, ErrorRule, ErrorsOfConverter, RefusedError, VirtualConverter};
+pub use converter::{Captured, Delivered, Quantiser, Sampler, capture};
+pub use errors::{ErrorLists, ErrorRule, ErrorsOfConverter, RefusedError, VirtualConverter};
 pub use parse::ParseSourceError;
-pub use recording::Recording;
+pub use recording::Periodic;
 pub use response::{Instants, sample};
 pub use signal::Signal;
 pub use source::{NormalisedSource, Source, Tone};

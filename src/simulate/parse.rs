@@ -2,7 +2,7 @@
 
 use super::source::{Source, Tone};
 use crate::messages::Quoted;
-use crate::quantity::{self, Time};
+use crate::quantity::{self, WrittenTime};
 use crate::units::{RadiansPerSecond, Seconds};
 use std::f64::consts::TAU;
 use std::str::FromStr;
@@ -75,7 +75,7 @@ pub(super) fn parse_term(text: &str, term: &str) -> Result<Source, ParseSourceEr
 /// Seconds, with an optional unit such as ms or ns.
 fn seconds(text: &str, number: &str) -> Result<Seconds, ParseSourceError> {
     match quantity::time(number) {
-        Ok(Time::Seconds(time)) => Ok(time),
+        Ok(WrittenTime::Seconds(time)) => Ok(time),
         _ => Err(not_a_number(text, number, " (seconds, or with a unit such as ms, us or ns)")),
     }
 }

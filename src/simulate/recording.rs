@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 
 /// A Taylor series ends where its terms are below this, relative to the first one.
 const NEGLIGIBLE_TERM: f64 = 1e-17;
-/// Terms of a Taylor series, at most; shifts up to [`Recording::most_shift`] take half of them.
+/// Terms of a Taylor series, at most; shifts up to [`Periodic::most_shift`] take half of them.
 const MOST_TERMS: u32 = 128;
 /// Largest pi |shift| / T: e to this power is what rounding errors grow by.
 const MOST_EXPONENT: f64 = 12.0;
@@ -16,7 +16,7 @@ const MOST_EXPONENT: f64 = 12.0;
 /// L samples with a spacing of T fast periods, continued with period L T and interpolated by the
 /// trigonometric polynomial of least degree: f(t) = Re sum_k c_k e^{2 pi j k t / (L T)}, k = 0 .. L/2.
 #[derive(Debug, Clone)]
-pub struct Recording {
+pub struct Periodic {
     /// X_k / L for k = 0 .. L/2, the last halved when L is even.
     spectrum: Vec<Complex<f64>>,
     /// T.
@@ -24,7 +24,7 @@ pub struct Recording {
     length: usize,
 }
 
-impl Recording {
+impl Periodic {
     /// `samples` taken at the instants 0, T, 2 T, .. with T = `spacing` > 0. An empty recording is the zero
     /// signal.
     pub fn new(samples: &[f64], spacing: FastPeriods) -> Self {
@@ -65,10 +65,10 @@ impl Recording {
     }
 
     /// (phi * f)(t) at the given instants, each later by its shift: the Taylor series around the instants,
-    /// each of whose terms is a sum as in [`Recording::sample`].
+    /// each of whose terms is a sum as in [`Periodic::sample`].
     ///
     /// Its error relative to the largest value is some 1e-16 e^z with z = pi |shift| / T; keep the shifts
-    /// below [`Recording::most_shift`].
+    /// below [`Periodic::most_shift`].
     pub fn sample_near(
         &self,
         filter: &StrictlyProper,
@@ -102,7 +102,7 @@ impl Recording {
         output
     }
 
-    /// The largest shift of [`Recording::sample_near`] that keeps its digits.
+    /// The largest shift of [`Periodic::sample_near`] that keeps its digits.
     pub fn most_shift(&self) -> FastPeriods {
         self.spacing * (MOST_EXPONENT / PI)
     }
@@ -212,7 +212,7 @@ mod tests {
         {
             let samples: Vec<f64> = (0..length).map(|n| ((n * n) as f64).sin()).collect();
             let ours =
-                Recording::new(&samples, FastPeriods(spacing)).sample(&filter(), instants(first, step, 9));
+                Periodic::new(&samples, FastPeriods(spacing)).sample(&filter(), instants(first, step, 9));
             for (n, value) in ours.iter().enumerate() {
                 let reference = definition(&samples, spacing, first + n as f64 * step);
                 assert!((value - reference).abs() < 1e-12, "{length} {n}: {value} {reference}");
@@ -226,7 +226,7 @@ mod tests {
         let w = TAU * 1234.0 / length as f64;
         let samples: Vec<f64> = (0..length).map(|n| (w * n as f64).cos()).collect();
         let ours =
-            Recording::new(&samples, FastPeriods(1.0)).sample(&filter(), instants(-0.6, 2.0, length / 2));
+            Periodic::new(&samples, FastPeriods(1.0)).sample(&filter(), instants(-0.6, 2.0, length / 2));
         let gain = response(w);
         for (n, value) in ours.iter().enumerate().step_by(977) {
             let exact = (gain * Complex::from_polar(1.0, w * (2.0 * n as f64 - 0.6))).re;
@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn an_empty_recording_is_the_zero_signal() {
-        let empty = Recording::new(&[], FastPeriods(1.0));
+        let empty = Periodic::new(&[], FastPeriods(1.0));
         assert_eq!(empty.sample(&filter(), instants(0.0, 1.0, 3)), vec![0.0; 3]);
     }
 }

@@ -1,7 +1,7 @@
 //! A real or complex analog signal.
 
 use super::normal::Purpose;
-use super::{Analog, ComplexSource, Converter, Delivered, WorkloadError, frames, target};
+use super::{Analog, ComplexSource, Delivered, Sampler, WorkloadError, frames, target};
 use crate::design::Problem;
 use crate::units::Seconds;
 
@@ -48,7 +48,7 @@ impl Signal {
         &self,
         problem: &Problem,
         i: usize,
-        converter: &Converter,
+        converter: &Sampler,
         level: f64,
         frames: usize,
     ) -> Delivered {

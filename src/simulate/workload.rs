@@ -84,7 +84,7 @@ fn most_panels(problem: &Problem, signal: &Analog, samples: usize, jittered: boo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::{Recording, Source};
+    use crate::simulate::{Periodic, Source};
     use crate::spec::Spec;
     use crate::units::Seconds;
 
@@ -102,7 +102,7 @@ mod tests {
     fn a_source_is_simulated_to_its_end() {
         assert_eq!(known("tones:0.3").usual_samples(2), 200);
         assert_eq!(known("chirp:0.01Hz..0.1Hz@1234.5s").usual_samples(2), 1235);
-        let recording = Recording::new(&[0.0; 11], FastPeriods(1.0));
+        let recording = Periodic::new(&[0.0; 11], FastPeriods(1.0));
         assert_eq!(Analog::Recorded(recording).usual_samples(4), 8);
     }
 

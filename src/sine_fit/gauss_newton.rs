@@ -1,7 +1,7 @@
 //! The fit: the coefficients of each channel are eliminated, the frequencies are iterated.
 
-use super::normal::{Oscillator, Point, accumulate, centre, linear_count};
-use super::result::{Covariance, SineFit};
+use super::normal::{Linearisation, Oscillator, accumulate, centre, linear_count};
+use super::result::{FitCovariance, SineFit};
 use super::{Channel, SineFitError, alias, distance_to_edge};
 use crate::linalg::least_squares::{LeastSquares, NoMinimum, NormalEquations, StepLimits, minimise};
 use crate::linalg::{LinalgError, Mat, PositiveFactor};
@@ -26,7 +26,7 @@ const FARTHEST: f64 = 2.0 * PI;
 /// # Errors
 /// [`SineFitError`], but neither `NoTone` nor `NoConvergence`.
 pub fn fit_known(channels: &[Channel<'_>], rate: Hertz, tones: &[Hertz]) -> Result<SineFit, SineFitError> {
-    let mut state = State::new(channels, rate, tones)?;
+    let mut state = FitParameters::new(channels, rate, tones)?;
     state.solve_linear()?;
     // The second solution takes away what the rounding of the first left.
     state.solve_linear()?;
@@ -40,7 +40,7 @@ pub fn fit_known(channels: &[Channel<'_>], rate: Hertz, tones: &[Hertz]) -> Resu
 /// # Errors
 /// [`SineFitError`].
 pub fn fit(channels: &[Channel<'_>], rate: Hertz, tones: &[Hertz]) -> Result<SineFit, SineFitError> {
-    let mut state = State::new(channels, rate, tones)?;
+    let mut state = FitParameters::new(channels, rate, tones)?;
     state.solve_linear()?;
     let steps = minimise(&mut state)?.steps;
     state.solve_linear()?;
@@ -49,7 +49,7 @@ pub fn fit(channels: &[Channel<'_>], rate: Hertz, tones: &[Hertz]) -> Result<Sin
 }
 
 /// The present parameters.
-struct State<'a> {
+struct FitParameters<'a> {
     channels: &'a [Channel<'a>],
     rate: Hertz,
     tones: &'a [Hertz],
@@ -78,7 +78,7 @@ struct Eliminated {
     used: usize,
 }
 
-impl LeastSquares for State<'_> {
+impl LeastSquares for FitParameters<'_> {
     type Error = SineFitError;
     /// A start within half a cycle per record takes three to six.
     const MOST_STEPS: usize = 40;
@@ -125,7 +125,7 @@ impl LeastSquares for State<'_> {
     }
 }
 
-impl<'a> State<'a> {
+impl<'a> FitParameters<'a> {
     fn new(channels: &'a [Channel<'a>], rate: Hertz, tones: &'a [Hertz]) -> Result<Self, SineFitError> {
         if channels.is_empty() || tones.is_empty() || !(rate.0 > 0.0 && rate.0.is_finite()) {
             return Err(SineFitError::Nothing { channels: channels.len(), tones: tones.len(), rate });
@@ -194,7 +194,7 @@ impl<'a> State<'a> {
         let oscillators: Vec<_> = self.frequencies.iter().map(|&f| Oscillator::new(f)).collect();
         let unit = is_searched.then_some(self.unit);
         let channel = |(channel, linear): (&Channel<'_>, &Vec<f64>)| {
-            let normal = accumulate(channel, &Point { oscillators: &oscillators, linear, unit });
+            let normal = accumulate(channel, &Linearisation { oscillators: &oscillators, linear, unit });
             Eliminated::new(&normal, linear.len()).map_err(|error| match error {
                 LinalgError::NotPositiveDefinite { pivot } => self.dependent(pivot / 2),
                 _ => self.dependent(0),
@@ -253,7 +253,7 @@ impl<'a> State<'a> {
             linear: self.linear,
             centres: of_channels(|channel| centre(channel.samples.len())),
             starts: of_channels(|channel| channel.offset.0),
-            covariance: Covariance { factors, couplings, variances, frequencies, unit: self.unit },
+            covariance: FitCovariance { factors, couplings, variances, frequencies, unit: self.unit },
         };
         Ok(fit.described(self.channels, &squares))
     }

@@ -46,7 +46,7 @@ mod tests;
 pub use error::SineFitError;
 pub use gauss_newton::{fit, fit_known};
 pub(crate) use result::wrapped;
-pub use result::{ChannelFit, ComplexChannel, Component, Direction, Ratio, SineFit, ToneFit};
+pub use result::{ChannelFit, ComplexChannel, Component, Ratio, Sense, SineFit, ToneFit};
 pub(crate) use search::with_lines;
 pub use search::{find_tones, locate};
 

@@ -46,7 +46,7 @@ pub(super) fn fractional_cycles(cycles: f64, n: f64) -> f64 {
 
 /// The parameters at which a channel is linearised: the coefficients of 1, cosine and sine of each tone,
 /// with the time of the phases at the centre of the record.
-pub(super) struct Point<'a> {
+pub(super) struct Linearisation<'a> {
     pub(super) oscillators: &'a [Oscillator],
     pub(super) linear: &'a [f64],
     /// Samples in the unit of time of the derivatives; `None` for known frequencies.
@@ -65,11 +65,11 @@ pub(super) fn centre(samples: usize) -> f64 {
 
 /// One pass over the samples. The columns of J are 1, then cosine and sine of each tone, then the derivative
 /// by each frequency; r is what the present parameters leave of the samples.
-pub(super) fn accumulate(channel: &Channel<'_>, point: &Point<'_>) -> NormalEquations {
+pub(super) fn accumulate(channel: &Channel<'_>, point: &Linearisation<'_>) -> NormalEquations {
     let columns = point.linear.len() + point.unit.map_or(0, |_| point.oscillators.len());
     let mut normal = NormalEquations::new(columns);
     let is_whole = point.unit.is_none() && channel.used() == channel.samples.len();
-    let mut block = Block { columns: vec![0.0; columns * BLOCK], residual: vec![0.0; BLOCK] };
+    let mut block = JacobianBlock { columns: vec![0.0; columns * BLOCK], residual: vec![0.0; BLOCK] };
     for first in (0..channel.samples.len()).step_by(BLOCK) {
         normal.rows += block.load(channel, point, first);
         for i in 0..columns {
@@ -126,18 +126,18 @@ fn sum_of_cosines(cycles: f64, samples: usize) -> f64 {
 }
 
 /// The columns of J and r for [`BLOCK`] samples, zero after the end of the record.
-struct Block {
+struct JacobianBlock {
     columns: Vec<f64>,
     residual: Vec<f64>,
 }
 
-impl Block {
+impl JacobianBlock {
     fn column(&self, i: usize) -> &[f64] {
         &self.columns[i * BLOCK..(i + 1) * BLOCK]
     }
 
     /// Fills the block from sample `first` on; returns the number of samples that take part.
-    fn load(&mut self, channel: &Channel<'_>, point: &Point<'_>, first: usize) -> usize {
+    fn load(&mut self, channel: &Channel<'_>, point: &Linearisation<'_>, first: usize) -> usize {
         let count = (channel.samples.len() - first).min(BLOCK);
         let time = first as f64 - centre(channel.samples.len());
         self.fill_columns(point, time);
@@ -156,7 +156,7 @@ impl Block {
         used
     }
 
-    fn fill_columns(&mut self, point: &Point<'_>, time: f64) {
+    fn fill_columns(&mut self, point: &Linearisation<'_>, time: f64) {
         self.columns[..BLOCK].fill(1.0);
         let (linear, derivatives) = self.columns.split_at_mut(point.linear.len() * BLOCK);
         let mut derivatives = derivatives.chunks_exact_mut(BLOCK);

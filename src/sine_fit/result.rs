@@ -42,7 +42,7 @@ pub struct SineFit {
     pub(super) centres: Vec<f64>,
     /// Instant of sample 0 of each channel, seconds.
     pub(super) starts: Vec<f64>,
-    pub(super) covariance: Covariance,
+    pub(super) covariance: FitCovariance,
 }
 
 /// What was fitted to one channel. Amplitudes and constants have the unit of the samples.
@@ -84,14 +84,14 @@ pub struct Ratio {
 
 /// One of the two exponentials of a tone in a complex record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Direction {
+pub enum Sense {
     /// At +f.
     Forward,
     /// At -f.
     Backward,
 }
 
-impl Direction {
+impl Sense {
     /// The sign of the frequency.
     pub(crate) fn sign(self) -> f64 {
         if self == Self::Forward { 1.0 } else { -1.0 }
@@ -107,7 +107,7 @@ pub enum Component {
     /// The sine in a channel.
     Real(usize),
     /// An exponential in a complex record, whose parts are of one length.
-    Complex(ComplexChannel, Direction),
+    Complex(ComplexChannel, Sense),
 }
 
 /// The covariance of all parameters. Channel i has the coefficients theta_i; the frequencies u (radians over
@@ -117,7 +117,7 @@ pub enum Component {
 /// cov(u) = U      cov(theta_i, u) = -C_i U      cov(theta_i, theta_j) = [i = j] s_i^2 G_i^-1 + C_i U C_j'
 /// ```
 #[derive(Debug, Clone)]
-pub(super) struct Covariance {
+pub(super) struct FitCovariance {
     /// Cholesky factors of G_i.
     pub(super) factors: Vec<PositiveFactor>,
     /// C_i = G_i^-1 B_i.
@@ -320,7 +320,7 @@ impl SineFit {
     }
 }
 
-impl Covariance {
+impl FitCovariance {
     /// The standard deviation of a quantity with these derivatives by the coefficients of some channels,
     /// each of which occurs once, and by the frequencies in radians over half the longest record.
     fn sigma(&self, by_channels: &[(usize, Mat)], by_frequencies: &Mat) -> f64 {

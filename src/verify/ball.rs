@@ -1,6 +1,6 @@
 //! Matrices of enclosed numbers.
 
-use crate::arithmetic::{DoubleDouble, Entry, Float512, Number, OUTWARD};
+use crate::arithmetic::{DoubleDouble, Float, Float512, MatrixEntry, OUTWARD};
 use nalgebra::DMatrix;
 
 pub(super) use crate::arithmetic::Ball;
@@ -10,43 +10,43 @@ pub(super) use crate::arithmetic::dense::{congruence, identity, product, symmetr
 pub(super) type Matrix<F = DoubleDouble> = DMatrix<Ball<F>>;
 
 /// The matrix of exactly these doubles.
-pub(super) fn exact<F: Number>(m: &DMatrix<f64>) -> Matrix<F> {
+pub(super) fn exact<F: Float>(m: &DMatrix<f64>) -> Matrix<F> {
     m.map(Ball::from)
 }
 
 /// The same in the precision of `F`.
-pub(super) fn shortened<F: Number>(m: &Matrix<Float512>) -> Matrix<F> {
+pub(super) fn shortened<F: Float>(m: &Matrix<Float512>) -> Matrix<F> {
     m.map(Ball::shortened)
 }
 
-pub(super) fn scaled<F: Number>(a: &Matrix<F>, by: Ball<F>) -> Matrix<F> {
+pub(super) fn scaled<F: Float>(a: &Matrix<F>, by: Ball<F>) -> Matrix<F> {
     a.map(|x| x * by)
 }
 
 /// a b'.
-pub(super) fn product_transposed<F: Number>(a: &Matrix<F>, b: &Matrix<F>) -> Matrix<F> {
+pub(super) fn product_transposed<F: Float>(a: &Matrix<F>, b: &Matrix<F>) -> Matrix<F> {
     product(a, &b.transpose())
 }
 
 /// a, and b below it.
-pub(super) fn above<T: Entry>(a: &DMatrix<T>, b: &DMatrix<T>) -> DMatrix<T> {
+pub(super) fn above<T: MatrixEntry>(a: &DMatrix<T>, b: &DMatrix<T>) -> DMatrix<T> {
     let entry = |i: usize, j: usize| if i < a.nrows() { a[(i, j)] } else { b[(i - a.nrows(), j)] };
     DMatrix::from_fn(a.nrows() + b.nrows(), a.ncols(), entry)
 }
 
 /// A bound on the largest sum of moduli in a row.
-pub(super) fn row_sum<F: Number>(m: &Matrix<F>) -> f64 {
+pub(super) fn row_sum<F: Float>(m: &Matrix<F>) -> f64 {
     let sum = |i: usize| m.row(i).iter().fold(0.0, |sum, x| (sum + x.magnitude()) * OUTWARD);
     (0..m.nrows()).map(sum).fold(0.0, nan_max)
 }
 
 /// A bound on the sum of the radii in each row.
-pub(super) fn row_radii<F: Number>(m: &Matrix<F>) -> Vec<f64> {
+pub(super) fn row_radii<F: Float>(m: &Matrix<F>) -> Vec<f64> {
     m.row_iter().map(|row| row.iter().fold(0.0, |sum, x| (sum + x.radius()) * OUTWARD)).collect()
 }
 
 /// The same for radii only: a bound on the spectral norm of a symmetric matrix within the radii.
-pub(super) fn radius_sum<F: Number>(m: &Matrix<F>) -> f64 {
+pub(super) fn radius_sum<F: Float>(m: &Matrix<F>) -> f64 {
     row_radii(m).into_iter().fold(0.0, nan_max)
 }
 
@@ -56,7 +56,7 @@ pub(super) fn nan_max(a: f64, b: f64) -> f64 {
 }
 
 /// The nearest doubles to the midpoints.
-pub(super) fn nearest<F: Number>(m: &Matrix<F>) -> DMatrix<f64> {
+pub(super) fn nearest<F: Float>(m: &Matrix<F>) -> DMatrix<f64> {
     m.map(Ball::nearest)
 }
 

@@ -8,7 +8,7 @@ use super::slow_period::SlowPeriod;
 use super::system::{EnclosedSystem, Midpoint};
 use super::timeline::{SamplingInstant, delay_periods, timeline};
 use super::{MAX_STATES, Strictness, Verified, VerifyError, gain, statements};
-use crate::arithmetic::{ComplexBall, Float512, Number};
+use crate::arithmetic::{ComplexBall, Float, Float512};
 use crate::bank::{Bank, Certificate, GainWitness, Gamma};
 use crate::linalg::{CMat, Complex};
 use crate::units::Timeline;
@@ -168,19 +168,19 @@ impl<'a> EnclosedErrorSystem<'a> {
 }
 
 /// Whether the radii stay below the share [`UNRESOLVED`] of the largest entry.
-fn is_gram_resolved<F: Number>(m: &DMatrix<ComplexBall<F>>) -> bool {
+fn is_gram_resolved<F: Float>(m: &DMatrix<ComplexBall<F>>) -> bool {
     let parts = || m.iter().flat_map(|x| [x.re, x.im]);
     let largest = parts().map(|x| x.nearest().abs()).fold(0.0, f64::max);
     parts().all(|x| x.radius() <= UNRESOLVED * largest)
 }
 
 /// The nearest doubles to the midpoints.
-fn nearest<F: Number>(m: &DMatrix<ComplexBall<F>>) -> CMat {
+fn nearest<F: Float>(m: &DMatrix<ComplexBall<F>>) -> CMat {
     m.map(|x| Complex::new(x.re.nearest(), x.im.nearest()))
 }
 
 /// Whether the square of a gain is known to [`UNRESOLVED`].
-fn is_resolved<F: Number>(square: &Ball<F>) -> bool {
+fn is_resolved<F: Float>(square: &Ball<F>) -> bool {
     square.radius() <= UNRESOLVED * square.nearest()
 }
 

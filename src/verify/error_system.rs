@@ -10,8 +10,8 @@
 use super::ball::{self, Ball, Matrix};
 use super::slow_period::SlowPeriod;
 use super::system::EnclosedSystem;
-use crate::arithmetic::{DoubleDouble, Number};
-use crate::bank::{StateSpace, SynthesisFilters};
+use crate::arithmetic::{DoubleDouble, Float};
+use crate::bank::{StateMatrices, SynthesisFilters};
 use crate::linalg;
 use std::ops::Range;
 
@@ -24,7 +24,7 @@ pub(super) struct BlockForm<F = DoubleDouble> {
     pub(super) d: Matrix<F>,
 }
 
-impl<F: Number> BlockForm<F> {
+impl<F: Float> BlockForm<F> {
     pub(super) fn new(filters: &SynthesisFilters, ratio: usize) -> Self {
         match filters {
             SynthesisFilters::Fir(taps) => Self::from_taps(taps, ratio),
@@ -76,7 +76,7 @@ impl<F: Number> BlockForm<F> {
         form
     }
 
-    fn from_block(block: &StateSpace, ratio: usize) -> Self {
+    fn from_block(block: &StateMatrices, ratio: usize) -> Self {
         let (states, channels) = (block.a.len(), block.d[0].len());
         let matrix = |rows: &[Vec<f64>], r, c| Matrix::from_fn(r, c, |i, j| Ball::from(rows[i][j]));
         Self {
@@ -89,13 +89,13 @@ impl<F: Number> BlockForm<F> {
 }
 
 /// The index ranges of the parts of the state.
-struct Layout {
+struct StateRanges {
     lines: Vec<Range<usize>>,
     filter: Range<usize>,
 }
 
-impl Layout {
-    fn new<F: Number>(period: &SlowPeriod<F>, filter_states: usize) -> Self {
+impl StateRanges {
+    fn new<F: Float>(period: &SlowPeriod<F>, filter_states: usize) -> Self {
         let mut next = period.order();
         let mut take = |count: usize| {
             next += count;
@@ -126,12 +126,12 @@ pub(super) fn order(
 }
 
 /// Linear maps from the state xi and the inputs u, row by row.
-struct Rows<F> {
+struct LinearMap<F> {
     state: Matrix<F>,
     input: Matrix<F>,
 }
 
-impl<F: Number> Rows<F> {
+impl<F: Float> LinearMap<F> {
     fn zeros(count: usize, states: usize, inputs: usize) -> Self {
         Self { state: ball::zeros(count, states), input: ball::zeros(count, inputs) }
     }
@@ -155,12 +155,16 @@ impl<F: Number> Rows<F> {
 
 /// The analog side with its delay lines: xi+ (with `more` rows of zeros below), and the samples that are
 /// counted in this period.
-fn sampled<F: Number>(period: &SlowPeriod<F>, layout: &Layout, more: usize) -> (Rows<F>, Rows<F>) {
+fn sampled<F: Float>(
+    period: &SlowPeriod<F>,
+    layout: &StateRanges,
+    more: usize,
+) -> (LinearMap<F>, LinearMap<F>) {
     let (n, order, inputs) = (period.order(), layout.order(), period.order() + period.samples());
-    let mut next = Rows::zeros(order + more, order, inputs);
+    let mut next = LinearMap::zeros(order + more, order, inputs);
     next.state.view_mut((0, 0), (n, n)).copy_from(&period.transition);
     (0..n).for_each(|i| next.input[(i, i)] = Ball::from(1.0));
-    let mut delivered = Rows::zeros(period.samples(), order, inputs);
+    let mut delivered = LinearMap::zeros(period.samples(), order, inputs);
     for (s, line) in layout.lines.iter().enumerate() {
         if line.is_empty() {
             delivered.take_sample(s, period, s);
@@ -174,9 +178,9 @@ fn sampled<F: Number>(period: &SlowPeriod<F>, layout: &Layout, more: usize) -> (
 }
 
 /// The error system of a bank with these filters.
-pub(super) fn error_system<F: Number>(period: &SlowPeriod<F>, filters: &BlockForm<F>) -> EnclosedSystem<F> {
+pub(super) fn error_system<F: Float>(period: &SlowPeriod<F>, filters: &BlockForm<F>) -> EnclosedSystem<F> {
     let outputs = filters.d.nrows();
-    let layout = Layout::new(period, filters.a.nrows());
+    let layout = StateRanges::new(period, filters.a.nrows());
     let order = layout.order();
     let (mut whole, delivered) = sampled(period, &layout, outputs);
     let (reference, measured) = (0..outputs, outputs..period.samples());

@@ -5,13 +5,13 @@ use super::ball::{self, Ball, Matrix};
 use super::timeline::SamplingInstant;
 use super::{MAX_ANALOG_STATES, MAX_WORK, VerifyError};
 use crate::analog::{Realisation, SignalFilter, StrictlyProper, enclosed, proportion, signal};
-use crate::arithmetic::{Float512, Number};
+use crate::arithmetic::{Float, LongBall};
 use crate::bank::Bank;
 use crate::spec::FilterSpec;
 use crate::units::GridTime;
 
 /// State equations of a filter.
-pub(super) type Equations = Realisation<Ball<Float512>>;
+pub(super) type Equations = Realisation<LongBall>;
 
 /// The filter W of the signal and the distinct front ends, which it drives, the states of W first:
 /// dx/dt = a x + b f. Without a signal the front ends stand side by side, driven by the same input.
@@ -106,7 +106,7 @@ impl FrontEnds {
     }
 
     /// Gain of a sample over the output of its filter.
-    pub(super) fn gain(sample: &SamplingInstant) -> Ball<Float512> {
+    pub(super) fn gain(sample: &SamplingInstant) -> LongBall {
         // A factor of one would only widen the enclosure.
         match sample.converter_gain {
             1.0 => sample.gain,
@@ -128,7 +128,7 @@ impl FrontEnds {
     }
 
     /// a and b.
-    pub(super) fn dynamics<F: Number>(&self) -> (Matrix<F>, Matrix<F>) {
+    pub(super) fn dynamics<F: Float>(&self) -> (Matrix<F>, Matrix<F>) {
         let order = self.order();
         let (mut a, mut b) = (ball::zeros(order, order), ball::zeros(order, 1));
         if let Some(signal) = &self.signal {
@@ -151,7 +151,7 @@ impl FrontEnds {
     }
 
     /// The row that reads a sample from the joint state.
-    pub(super) fn output<F: Number>(&self, sample: &SamplingInstant) -> Matrix<F> {
+    pub(super) fn output<F: Float>(&self, sample: &SamplingInstant) -> Matrix<F> {
         let FrontEnd { start, equations } = &self.filters[sample.filter];
         let mut row = ball::zeros(1, self.order());
         let gain = Self::gain(sample);

@@ -7,12 +7,12 @@
 use super::ball::{self, Ball};
 use super::slow_period::SlowPeriod;
 use super::spectrum::{self, adjoint, unit};
-use crate::arithmetic::{ComplexBall, DoubleDouble, Number};
+use crate::arithmetic::{ComplexBall, DoubleDouble, Float};
 use crate::bank::{GainWitness, SynthesisFilters};
 use nalgebra::DMatrix;
 
 /// The square of a lower bound of this bank's norm, from its gain at a frequency.
-pub(super) fn square_of_gain<F: Number>(
+pub(super) fn square_of_gain<F: Float>(
     period: &SlowPeriod<F>,
     filters: &SynthesisFilters,
     ratio: usize,
@@ -28,7 +28,7 @@ pub(super) fn square_of_gain<F: Number>(
 }
 
 /// K K* of this bank.
-pub(super) fn error_gram<F: Number>(
+pub(super) fn error_gram<F: Float>(
     period: &SlowPeriod<F>,
     filters: &SynthesisFilters,
     ratio: usize,
@@ -40,7 +40,7 @@ pub(super) fn error_gram<F: Number>(
 }
 
 /// [a; -F* a], the combination of all samples that makes a* e.
-fn error_samples<F: Number>(
+fn error_samples<F: Float>(
     filters: &SynthesisFilters,
     ratio: usize,
     z: ComplexBall<F>,
@@ -51,7 +51,7 @@ fn error_samples<F: Number>(
 }
 
 /// A lower bound of the root of `square`; `None` if it is unknown.
-pub(super) fn root<F: Number>(square: Ball<F>) -> Option<f64> {
+pub(super) fn root<F: Float>(square: Ball<F>) -> Option<f64> {
     // A witness of weight zero proves nothing, and NaN is not a bound; `max` would hide it.
     let square = square.lower();
     let value = Ball::<DoubleDouble>::from(square.max(0.0)).sqrt().lower();

@@ -7,7 +7,7 @@
 //! the midpoint less (radii + g tr) I is factored.
 
 use super::ball::{self, Ball, Matrix};
-use crate::arithmetic::Number;
+use crate::arithmetic::Float;
 use crate::arithmetic::dense::cholesky;
 use nalgebra::DMatrix;
 
@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 /// semidefinite matrix indefinite.
 const SEMIDEFINITE_SHIFT: f64 = 1e-28;
 /// Makes up for the roundings of a sum of bounds in double precision, up to 10^12 terms.
-const SUM_OUTWARD: f64 = 1.001;
+pub(super) const SUM_OUTWARD: f64 = 1.001;
 /// Bound of a factorisation's error over its first-order term: the higher ones are far smaller than it.
 const FACTORING: f64 = 2.0;
 
@@ -34,7 +34,7 @@ pub(super) fn root(m: &Matrix) -> Option<Matrix> {
 
 /// Powers of two that bring the diagonal of a matrix to the size of one: the scaling is exact, and the
 /// proof does not depend on units.
-fn scales<F: Number>(m: &Matrix<F>) -> Vec<f64> {
+fn scales<F: Float>(m: &Matrix<F>) -> Vec<f64> {
     let power = |i: usize| {
         let diagonal = m[(i, i)].nearest();
         if diagonal > 0.0 && diagonal.is_finite() {
@@ -47,7 +47,7 @@ fn scales<F: Number>(m: &Matrix<F>) -> Vec<f64> {
 }
 
 /// Whether every symmetric matrix in the enclosure `m` (lower triangle read) is positive definite.
-pub(super) fn is_positive_definite<F: Number>(m: &Matrix<F>) -> bool {
+pub(super) fn is_positive_definite<F: Float>(m: &Matrix<F>) -> bool {
     let (n, scales) = (m.nrows(), scales(m));
     let scaled =
         Matrix::from_fn(n, n, |i, j| m[(i.max(j), i.min(j))] * Ball::from(scales[i]) * Ball::from(scales[j]));
@@ -59,7 +59,7 @@ pub(super) fn is_positive_definite<F: Number>(m: &Matrix<F>) -> bool {
 }
 
 /// A bound on the error of a factorisation of `m` less a shift that is small beside it.
-fn factoring<F: Number>(m: &Matrix<F>) -> f64 {
+fn factoring<F: Float>(m: &Matrix<F>) -> f64 {
     let n = m.nrows();
     let trace: f64 = (0..n).map(|i| m[(i, i)].magnitude()).sum();
     FACTORING * (n + 2) as f64 * F::ROUNDING * trace

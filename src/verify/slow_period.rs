@@ -8,9 +8,9 @@
 
 use super::ball::{self, Matrix};
 use super::front_ends::FrontEnds;
-use super::state_transition::{StateTransition, state_transition};
+use super::state_transition::{EnclosedTransition, state_transition};
 use super::timeline::{SamplingInstant, between, delay_periods};
-use crate::arithmetic::{DoubleDouble, Number};
+use crate::arithmetic::{DoubleDouble, Float};
 use crate::units::{GridTime, Timeline};
 
 /// x+ = transition x + w, and for each sample s: s = outputs x + v, counted `delay_periods` slow periods
@@ -27,13 +27,13 @@ pub(super) struct SlowPeriod<F = DoubleDouble> {
     pub(super) delay_periods: Vec<usize>,
 }
 
-impl<F: Number> SlowPeriod<F> {
+impl<F: Float> SlowPeriod<F> {
     /// Follows `front_ends` through the period of `timeline` with `samples`.
     pub(super) fn new(front_ends: &FrontEnds, timeline: &Timeline, samples: &[SamplingInstant]) -> Self {
         let (a, b) = front_ends.dynamics();
         let instants = timeline.instants();
         let from_start = |&time| state_transition(&a, &b, between(timeline.start(), time));
-        let since_start: Vec<StateTransition<F>> = instants.iter().map(from_start).collect();
+        let since_start: Vec<EnclosedTransition<F>> = instants.iter().map(from_start).collect();
         let rows: Vec<Matrix<F>> = samples.iter().map(|sample| front_ends.output(sample)).collect();
         let n = front_ends.order();
         let mut outputs = ball::zeros(samples.len(), n);
@@ -64,10 +64,10 @@ impl<F: Number> SlowPeriod<F> {
 
 /// Fills the lower triangle beyond the states: the entries of each sample with the samples at the same
 /// instant or later.
-fn correlate<F: Number>(
+fn correlate<F: Float>(
     gram: &mut Matrix<F>,
     timeline: &Timeline,
-    since_start: &[StateTransition<F>],
+    since_start: &[EnclosedTransition<F>],
     between: &[Matrix<F>],
     rows: &[Matrix<F>],
 ) {

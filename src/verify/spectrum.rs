@@ -5,20 +5,20 @@
 use super::ball::{self, Ball, Matrix};
 use super::error_system::BlockForm;
 use super::slow_period::SlowPeriod;
-use crate::arithmetic::{ComplexBall, DoubleDouble, Number};
+use crate::arithmetic::{ComplexBall, DoubleDouble, Float};
 use crate::bank::SynthesisFilters;
 use crate::linalg::{self, Mat};
 use nalgebra::DMatrix;
 
 /// The point of the unit circle named by `half`.
-pub(super) fn unit<F: Number>(half: [f64; 2]) -> ComplexBall<F> {
+pub(super) fn unit<F: Float>(half: [f64; 2]) -> ComplexBall<F> {
     let [c, s] = half.map(Ball::from);
     let (cc, ss, cs) = (c * c, s * s, c * s);
     ComplexBall::new((cc - ss) / (cc + ss), (cs + cs) / (cc + ss))
 }
 
 /// z^-k on the unit circle.
-pub(super) fn delay<F: Number>(z: ComplexBall<F>, periods: usize) -> ComplexBall<F> {
+pub(super) fn delay<F: Float>(z: ComplexBall<F>, periods: usize) -> ComplexBall<F> {
     let (mut power, mut square) = (ComplexBall::from(1.0), z.conj());
     let mut rest = periods;
     while rest > 0 {
@@ -32,16 +32,16 @@ pub(super) fn delay<F: Number>(z: ComplexBall<F>, periods: usize) -> ComplexBall
 }
 
 /// The conjugate transpose.
-pub(super) fn adjoint<F: Number>(m: &DMatrix<ComplexBall<F>>) -> DMatrix<ComplexBall<F>> {
+pub(super) fn adjoint<F: Float>(m: &DMatrix<ComplexBall<F>>) -> DMatrix<ComplexBall<F>> {
     m.transpose().map(ComplexBall::conj)
 }
 
-fn complex<F: Number>(m: &Matrix<F>) -> DMatrix<ComplexBall<F>> {
+fn complex<F: Float>(m: &Matrix<F>) -> DMatrix<ComplexBall<F>> {
     m.map(ComplexBall::from)
 }
 
 /// Row s times `factors[s]`.
-fn with_rows_times<F: Number>(
+fn with_rows_times<F: Float>(
     m: &DMatrix<ComplexBall<F>>,
     factors: &[ComplexBall<F>],
 ) -> DMatrix<ComplexBall<F>> {
@@ -57,7 +57,7 @@ const LEAST_GAIN: f64 = 0.1;
 /// (z I - a)^-1 right, as a real system B x = r of twice the order.
 ///
 /// Any approximate solution will do: it is wrong by at most ||B^-1|| times its residual, which is enclosed.
-fn resolved<F: Number>(
+fn resolved<F: Float>(
     a: &Matrix<F>,
     z: ComplexBall<F>,
     right: &DMatrix<ComplexBall<F>>,
@@ -104,7 +104,7 @@ fn resolved<F: Number>(
     DMatrix::from_fn(n, x.ncols(), |i, j| ComplexBall::new(part(i, j), part(i + n, j)))
 }
 
-fn refinements<F: Number>() -> usize {
+fn refinements<F: Float>() -> usize {
     let digits = -F::ROUNDING.log10() / -DoubleDouble::ROUNDING.log10();
     (REFINEMENTS as f64 * digits).ceil() as usize
 }
@@ -112,7 +112,7 @@ fn refinements<F: Number>() -> usize {
 /// A bound on the row sums of B^-1 from an approximate inverse R: ||R|| / (1 - q) with
 /// q = ||I - R B|| < 1/2, else NaN. The product R B is taken in double precision; its rounding is at most n
 /// eps |R| |B|.
-fn inverse_norm<F: Number>(matrix: &Matrix<F>, inverse: &Mat) -> f64 {
+fn inverse_norm<F: Float>(matrix: &Matrix<F>, inverse: &Mat) -> f64 {
     let n = matrix.nrows();
     let near = ball::nearest(matrix);
     let sums = |m: &Mat| m.row_iter().map(|row| row.iter().map(|x| x.abs()).sum()).fold(0.0, ball::nan_max);
@@ -124,7 +124,7 @@ fn inverse_norm<F: Number>(matrix: &Matrix<F>, inverse: &Mat) -> f64 {
 
 /// Gram matrix of all samples of a slow period at the point z of the unit circle: G G* of their responses G
 /// to the input.
-pub(super) fn gram<F: Number>(period: &SlowPeriod<F>, z: ComplexBall<F>) -> DMatrix<ComplexBall<F>> {
+pub(super) fn gram<F: Float>(period: &SlowPeriod<F>, z: ComplexBall<F>) -> DMatrix<ComplexBall<F>> {
     let (n, samples) = (period.order(), period.samples());
     let resolvent = resolved(&period.transition, z, &ball::identity(n));
     let phases = phases(period, z);
@@ -152,12 +152,12 @@ pub(super) fn gram<F: Number>(period: &SlowPeriod<F>, z: ComplexBall<F>) -> DMat
 }
 
 /// For each sample z^-k, k the periods by which it is late.
-fn phases<F: Number>(period: &SlowPeriod<F>, z: ComplexBall<F>) -> Vec<ComplexBall<F>> {
+fn phases<F: Float>(period: &SlowPeriod<F>, z: ComplexBall<F>) -> Vec<ComplexBall<F>> {
     period.delay_periods.iter().map(|&late| delay(z, late)).collect()
 }
 
 /// Gamma b, without Gamma.
-pub(super) fn gram_times<F: Number>(
+pub(super) fn gram_times<F: Float>(
     period: &SlowPeriod<F>,
     z: ComplexBall<F>,
     b: &DMatrix<ComplexBall<F>>,
@@ -175,7 +175,7 @@ pub(super) fn gram_times<F: Number>(
 }
 
 /// F(z), M x N, of the bank's filters.
-pub(super) fn filter_response<F: Number>(
+pub(super) fn filter_response<F: Float>(
     filters: &SynthesisFilters,
     ratio: usize,
     z: ComplexBall<F>,
@@ -216,7 +216,7 @@ mod tests {
     }
 
     /// (z I - a) times the resolvent, less one.
-    fn rest<F: Number>(a: &Matrix<F>, z: ComplexBall<F>) -> DMatrix<ComplexBall<F>> {
+    fn rest<F: Float>(a: &Matrix<F>, z: ComplexBall<F>) -> DMatrix<ComplexBall<F>> {
         let one: DMatrix<ComplexBall<F>> = ball::identity(a.nrows());
         let shifted = one.map(|x| x * z) - complex(a);
         ball::product(&shifted, &resolved(a, z, &one)) - one

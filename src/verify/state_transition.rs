@@ -6,14 +6,14 @@
 //! G(2 t) = G(t) + e^{A t} G(t) e^{A' t}. Only sums and products occur.
 
 use super::ball::{self, Ball, Matrix};
-use crate::arithmetic::{DoubleDouble, Number};
+use crate::arithmetic::{DoubleDouble, Float};
 
 /// Maximum number of halvings of the time: ||A|| t up to 1e18.
 const MAX_HALVINGS: i32 = 64;
 
 /// e^{A t} and G(t).
 #[derive(Debug, Clone)]
-pub(super) struct StateTransition<F = DoubleDouble> {
+pub(super) struct EnclosedTransition<F = DoubleDouble> {
     /// e^{A t}.
     pub(super) transition: Matrix<F>,
     /// G(t).
@@ -21,14 +21,14 @@ pub(super) struct StateTransition<F = DoubleDouble> {
 }
 
 /// Encloses both for `dx/dt = a x + b f` after the time `t`.
-pub(super) fn state_transition<F: Number>(a: &Matrix<F>, b: &Matrix<F>, t: Ball<F>) -> StateTransition<F> {
+pub(super) fn state_transition<F: Float>(a: &Matrix<F>, b: &Matrix<F>, t: Ball<F>) -> EnclosedTransition<F> {
     let norm = ball::nan_max(ball::row_sum(a), ball::row_sum(&a.transpose()));
     let halvings = halvings(norm * t.magnitude());
     let mut whole = taylor(a, b, t * Ball::from(0.5f64.powi(halvings)), norm);
     for _ in 0..halvings {
-        let StateTransition { transition, gramian } = &whole;
+        let EnclosedTransition { transition, gramian } = &whole;
         let grown = gramian + ball::congruence(transition, gramian);
-        whole = StateTransition { gramian: grown, transition: ball::product(transition, transition) };
+        whole = EnclosedTransition { gramian: grown, transition: ball::product(transition, transition) };
     }
     whole
 }
@@ -39,7 +39,7 @@ fn halvings(size: f64) -> i32 {
 }
 
 /// The series sum_k (A t)^k / k! and sum_k t^k / k! M_k with M_1 = B B', M_{k+1} = A M_k + M_k A'.
-fn taylor<F: Number>(a: &Matrix<F>, b: &Matrix<F>, t: Ball<F>, norm: f64) -> StateTransition<F> {
+fn taylor<F: Float>(a: &Matrix<F>, b: &Matrix<F>, t: Ball<F>, norm: f64) -> EnclosedTransition<F> {
     let (n, terms) = (a.nrows(), F::SERIES_TERMS);
     let at = ball::scaled(a, t);
     let inputs = ball::scaled(&ball::product_transposed(b, b), t);
@@ -59,7 +59,7 @@ fn taylor<F: Number>(a: &Matrix<F>, b: &Matrix<F>, t: Ball<F>, norm: f64) -> Sta
     let gramian_rest = 2.0 * ball::row_sum(&inputs) * (2.0 * size).powi(terms as i32) / factorial;
     // This form of the comparison also treats NaN as unknown; the remainder may be too small for a double.
     let known = |rest: f64| if size <= 0.26 { 1.01 * rest + f64::MIN_POSITIVE } else { f64::NAN };
-    StateTransition {
+    EnclosedTransition {
         transition: transition.map(|x| x.widened(known(rest))),
         gramian: gramian.map(|x| x.widened(known(gramian_rest))),
     }
@@ -75,7 +75,7 @@ mod tests {
     use crate::arithmetic::Float512;
     use crate::linalg::Mat;
 
-    fn enclosed(a: &Mat, b: &Mat, t: f64) -> StateTransition {
+    fn enclosed(a: &Mat, b: &Mat, t: f64) -> EnclosedTransition {
         state_transition(&ball::exact(a), &ball::exact(b), Ball::from(t))
     }
 
@@ -129,7 +129,7 @@ mod tests {
         let a = Mat::from_row_slice(3, 3, &[-1.0, 2.0, 0.0, -2.0, -1.0, 30.0, 0.0, 0.0, -70.0]);
         let b = Mat::from_row_slice(3, 1, &[0.0, 1.0, 1.0]);
         let short = enclosed(&a, &b, 1.7);
-        let long: StateTransition<Float512> =
+        let long: EnclosedTransition<Float512> =
             state_transition(&ball::exact(&a), &ball::exact(&b), Ball::from(1.7));
         for (x, y) in short.gramian.iter().zip(&long.gramian) {
             assert!(

@@ -18,7 +18,7 @@ use super::ball::{self, Ball, Matrix};
 use super::error_system::BlockForm;
 use super::positive;
 use super::slow_period::SlowPeriod;
-use crate::arithmetic::{DoubleDouble, Number};
+use crate::arithmetic::{DoubleDouble, Float};
 use crate::bank::NormBound;
 use crate::linalg::Mat;
 
@@ -49,7 +49,7 @@ pub(crate) struct Midpoint {
     pub(crate) d: Mat,
 }
 
-impl<F: Number> EnclosedSystem<F> {
+impl<F: Float> EnclosedSystem<F> {
     /// Filters whose inputs are white with these powers.
     pub(super) fn of_filters(filters: &BlockForm<F>, powers: &[Ball<F>]) -> Self {
         let BlockForm { a, b, c, d } = filters;
@@ -127,7 +127,7 @@ impl EnclosedSystem {
 }
 
 /// R, enclosed.
-fn triangular<F: Number>(factor: [&[Vec<f64>]; 2]) -> Matrix<F> {
+fn triangular<F: Float>(factor: [&[Vec<f64>]; 2]) -> Matrix<F> {
     let n = factor[0].len();
     let entry = |rows: &[Vec<f64>], i: usize, j: usize| {
         rows.get(i).and_then(|row| row.get(j)).map_or(Ball::ZERO, |&x| Ball::from(x))

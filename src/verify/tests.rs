@@ -4,7 +4,7 @@
 use super::spectrum;
 use super::*;
 use crate::arithmetic::{ComplexBall, DoubleDouble};
-use crate::bank::{Certificate, Gamma, StateSpace, SynthesisFilters};
+use crate::bank::{Certificate, Gamma, StateMatrices, SynthesisFilters};
 use crate::design::{LiftedPlant, Problem, filters};
 use crate::linalg::{CMat, hermitian_eigenvalues};
 use crate::lti::FrequencyResponse;
@@ -166,7 +166,7 @@ fn gram_matrices_are_positive_and_tight() {
 fn designed(method: Method, latency: usize, taps: usize) -> (Bank, Verified) {
     let mut spec = alike(&thesis_filter(), &[1.2, 0.6], 2, latency, 1).spec.unwrap();
     spec.design = DesignSpec::new(method, method.has_taps().then_some(taps));
-    let design = crate::design::design(&spec, &crate::design::Options::default()).unwrap();
+    let design = crate::design::design(&spec, &crate::design::DesignOptions::default()).unwrap();
     (design.bank, design.proof.unwrap())
 }
 
@@ -227,7 +227,7 @@ fn a_corrected_certificate_passes_and_proves_no_less_than_the_norm() {
     let steep = family(Family::Butterworth, 8, 0.1 * TAU);
     let mut spec = bank(steep.clone(), vec![steep], &[0.6], 2, 1, 1).spec.unwrap();
     spec.design = DesignSpec::new(Method::Iir, None);
-    let design = crate::design::design(&spec, &crate::design::Options::default()).unwrap();
+    let design = crate::design::design(&spec, &crate::design::DesignOptions::default()).unwrap();
     let proven = design.proof.unwrap();
     assert!(proven.upper - proven.attained <= 1e-4 * proven.upper, "{proven:?}");
     let certificate = design.bank.proof.as_ref().unwrap().upper.clone();
@@ -244,7 +244,7 @@ fn an_unstable_bank_has_no_certificate() {
     let SynthesisFilters::StateSpace(block) = &bank.filters else { panic!("states") };
     let n = block.a.len();
     let grown = (0..n).map(|i| (0..n).map(|j| if i == j { 1.5 } else { block.a[i][j] }).collect()).collect();
-    let unstable = StateSpace { a: grown, ..block.clone() };
+    let unstable = StateMatrices { a: grown, ..block.clone() };
     let bank = Bank { filters: SynthesisFilters::StateSpace(unstable), gamma: Gamma::default(), ..bank };
     assert!(matches!(verify(&bank), Err(VerifyError::NotProven { .. })));
     assert!(crate::design::prove(&bank).is_err());

@@ -2,7 +2,7 @@
 
 use super::VerifyError;
 use super::ball::Ball;
-use crate::arithmetic::{Float512, Number};
+use crate::arithmetic::{Float, LongBall};
 use crate::units::{Fraction, GridTime, Timeline};
 
 /// Maximum number of periods by which a sample may be late; the limit keeps the count exact in doubles.
@@ -14,7 +14,7 @@ pub(super) struct SamplingInstant {
     /// Index of the filter.
     pub(super) filter: usize,
     /// The output of the sample's own filter over that filter's, not zero.
-    pub(super) gain: Ball<Float512>,
+    pub(super) gain: LongBall,
     /// The sample over the output of its own filter, not zero.
     pub(super) converter_gain: f64,
     pub(super) time: GridTime,
@@ -37,7 +37,7 @@ pub(super) fn delay_periods(timeline: &Timeline) -> Vec<usize> {
 }
 
 /// Encloses the time from `earlier` to `later` in fast periods; exactly zero if they are one.
-pub(super) fn between<F: Number>(earlier: GridTime, later: GridTime) -> Ball<F> {
+pub(super) fn between<F: Float>(earlier: GridTime, later: GridTime) -> Ball<F> {
     if earlier == later {
         return Ball::ZERO;
     }
@@ -55,12 +55,13 @@ pub(super) fn between<F: Number>(earlier: GridTime, later: GridTime) -> Ball<F> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arithmetic::Float512;
     use crate::units::Seconds;
 
     #[test]
     fn times_are_enclosed_relatively_and_samples_are_not_too_late() {
         let at = |t| GridTime::new(Seconds(t), Seconds(0.1));
-        let apart: Ball<Float512> = between(at(-60_000.000_000_02), at(-60_000.000_000_005));
+        let apart: LongBall = between(at(-60_000.000_000_02), at(-60_000.000_000_005));
         let exact = (60_000.000_000_02_f64 - 60_000.000_000_005) / 0.1;
         assert!((apart.nearest() / exact - 1.0).abs() < 1e-15 && apart.radius() < 1e-30 * exact, "{apart:?}");
         assert_eq!(between::<Float512>(at(0.3), at(0.3)), Ball::ZERO);

@@ -5,7 +5,7 @@
 //! file `causal-optima.json` of the data where `HYBANK_SLOW` is set.
 
 use crate::support::specs::alike;
-use hybank::design::{Options, design};
+use hybank::design::{DesignOptions, design};
 use hybank::spec::{Family, FilterSpec, Passband, Spec};
 use hybank::units::Hertz;
 use hybank::verify::verify;
@@ -108,7 +108,7 @@ fn every_causal_optimum_is_reached() {
     for Case { name, mut spec, optimum, .. } in cases {
         spec.design.method = hybank::spec::Method::Iir;
         let begin = std::time::Instant::now();
-        let excess = match design(&spec, &Options::without_proof()) {
+        let excess = match design(&spec, &DesignOptions::without_proof()) {
             Ok(design) => design.bank.gamma.norm.unwrap() / optimum - 1.0,
             Err(error) => {
                 println!("{error}");
@@ -131,7 +131,8 @@ fn hardly_any_latency_is_proven() {
     let cases: Vec<Case> = usual.chain(table()).filter(|case| case.spec.latency.unwrap() <= 2).collect();
     for Case { name, mut spec, optimum, noncausal } in cases {
         spec.design.method = hybank::spec::Method::Iir;
-        let design = design(&spec, &Options::default()).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let design =
+            design(&spec, &DesignOptions::default()).unwrap_or_else(|error| panic!("{name}: {error}"));
         let proven = design.proof.unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!(verify(&design.bank).unwrap(), proven, "{name}");
         assert!((proven.upper / optimum - 1.0).abs() < 1e-4, "{name}: {proven:?}");

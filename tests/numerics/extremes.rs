@@ -3,7 +3,7 @@
 
 use crate::support::random::Random;
 use hybank::bank::Bank;
-use hybank::design::{DesignError, Options, ProofSearch, analyze, design};
+use hybank::design::{DesignError, DesignOptions, ProofSearch, analyze, design};
 use hybank::spec::{DesignOverrides, Spec};
 use serde_json::Value;
 use trials::rounds;
@@ -55,7 +55,7 @@ fn designed(spec: &Value) -> Result<Bank, String> {
     let no_files = |_: &_| Err("no files".to_owned());
     let spec = Spec::from_data(spec, "spec", DesignOverrides::default(), &no_files);
     let spec = spec.map_err(|error| error.to_string())?;
-    let options = Options { proof: ProofSearch::Skip, ..Options::default() };
+    let options = DesignOptions { proof: ProofSearch::Skip, ..DesignOptions::default() };
     match design(&spec, &options) {
         Ok(found) => Ok(found.bank),
         Err(error @ (DesignError::Lti(_) | DesignError::Linalg(_))) => {

@@ -1,7 +1,7 @@
 //! The ready specs and banks in `filters/`: each spec designs, each bank keeps its promise.
 
 use hybank::bank::{Bank, Gamma};
-use hybank::design::{Options, analyze, certify, design};
+use hybank::design::{DesignOptions, analyze, certify, design};
 use hybank::spec::Spec;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -51,7 +51,7 @@ fn each_bank_keeps_the_gamma_in_its_file() {
 fn a_fresh_design_agrees() {
     for (name, spec, bank) in pairs() {
         // `verify` proves the bounds of the files. The search for a proof of one of them takes 15 s.
-        let designed = design(&spec, &Options::without_proof()).unwrap().bank.gamma;
+        let designed = design(&spec, &DesignOptions::without_proof()).unwrap().bank.gamma;
         let values = [(designed.norm, bank.gamma.norm), (designed.noncausal, bank.gamma.noncausal)];
         let (norm, lower) = (bank.gamma.norm.unwrap(), designed.lower.unwrap());
         assert!(designed.upper.unwrap() >= norm, "{name}: {designed:?}");

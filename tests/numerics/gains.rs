@@ -3,7 +3,7 @@
 
 use crate::support::specs::{alike, amplified, amplify, butterworth, tf, thesis, with_taps};
 use hybank::bank::{Bank, SynthesisFilters};
-use hybank::design::{Options, analyze, design};
+use hybank::design::{DesignOptions, analyze, design};
 use hybank::spec::{DesignSpec, FilterSpec, Method, Spec};
 use hybank::verify::verify;
 
@@ -20,7 +20,7 @@ fn example(method: Method) -> Spec {
 
 /// Designs and proves; gamma is `wanted` up to what the design leaves open, computed, proven and read back.
 fn check(what: &str, spec: &Spec, wanted: f64) -> Bank {
-    let found = design(spec, &Options::default()).unwrap_or_else(|error| panic!("{what}: {error}"));
+    let found = design(spec, &DesignOptions::default()).unwrap_or_else(|error| panic!("{what}: {error}"));
     let gamma = &found.bank.gamma;
     let norm = gamma.norm.unwrap();
     assert!((norm / wanted - 1.0).abs() < 1e-6, "{what}: {gamma:?}, wanted {wanted:e}");
@@ -84,9 +84,9 @@ fn a_gain_of_a_converter_is_undone_by_its_filter() {
 fn the_methods_for_comparison_know_the_gains_of_converters() {
     for method in [Method::Sinc, Method::Separation] {
         let mut spec = Spec { design: DesignSpec::new(method, Some(22)), ..example(Method::Fir) };
-        let plain = design(&spec, &Options::default()).unwrap().bank;
+        let plain = design(&spec, &DesignOptions::default()).unwrap().bank;
         (spec.channels[0].gain, spec.channels[1].gain) = (0.5, -2.0);
-        let bank = design(&spec, &Options::default()).unwrap().bank;
+        let bank = design(&spec, &DesignOptions::default()).unwrap().bank;
         let [plain_gamma, gamma] = [&plain, &bank].map(|bank| bank.gamma.norm.unwrap());
         assert!((gamma / plain_gamma - 1.0).abs() < 1e-6, "{method:?}: {gamma} {plain_gamma}");
         assert_eq!(bank.gains, [0.5, -2.0]);
@@ -138,7 +138,7 @@ fn steep_front_ends_of_much_gain_are_designed() {
         let unity = FilterSpec::Cascade { cascade: vec![butterworth(4, 1.2), tf(&[1.0], &[0.1, 1.0])] };
         let gamma = |filter| {
             let spec = alike(filter, 4, 12, &[0.0, 1.3, 2.1, 2.95]);
-            design(&spec, &Options::default()).unwrap().bank.gamma.norm.unwrap()
+            design(&spec, &DesignOptions::default()).unwrap().bank.gamma.norm.unwrap()
         };
         let (amplified, plain) = (gamma(&filter), gamma(&unity));
         assert!((amplified / (gain * plain) - 1.0).abs() < 1e-6, "{amplified:e} {plain}");
@@ -158,7 +158,7 @@ fn gains_twelve_decades_apart_change_no_gamma() {
         let mut unequal = spec.clone();
         let gains = [1e-6, 1.0, 1e6];
         unequal.channels.iter_mut().zip(gains).for_each(|(channel, gain)| channel.gain = gain);
-        let [plain, unequal] = [spec, unequal].map(|spec| design(&spec, &Options::default()).unwrap());
+        let [plain, unequal] = [spec, unequal].map(|spec| design(&spec, &DesignOptions::default()).unwrap());
         let [before, after] = [&plain, &unequal].map(|found| found.bank.gamma.norm.unwrap());
         assert!((after / before - 1.0).abs() < 1e-9, "{method:?}: {before} {after}");
         let noncausal = |found: &hybank::design::Design| found.bank.gamma.noncausal.unwrap();

@@ -6,7 +6,7 @@
 
 use crate::support::specs::{alike, butterworth, tf, thesis, thesis_filter, with_taps};
 use hybank::design::filters::lifted;
-use hybank::design::{Design, DesignError, LiftedPlant, Options, Problem, analyze};
+use hybank::design::{Design, DesignError, DesignOptions, LiftedPlant, Problem, analyze};
 use hybank::lti::FrequencyResponse;
 use hybank::spec::{DesignSpec, Method, Spec};
 use hybank::units::Seconds;
@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 
 /// Designs without a search for proofs, which other tests are about.
 fn design(spec: &Spec) -> Result<Design, DesignError> {
-    hybank::design::design(spec, &Options::without_proof())
+    hybank::design::design(spec, &DesignOptions::without_proof())
 }
 
 pub(crate) fn g8() -> Spec {

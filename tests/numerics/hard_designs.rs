@@ -3,12 +3,12 @@
 //! must not be larger; and no lower bound may exceed what any bank of the kind achieves.
 
 use crate::support::specs::{alike, low_pass};
-use hybank::design::{Design, DesignError, Options, analyze, certify};
+use hybank::design::{Design, DesignError, DesignOptions, analyze, certify};
 use hybank::spec::{DesignSpec, Family, Method, Spec};
 
 /// Designs without a search for proofs, which other tests are about.
 fn design(spec: &Spec) -> Result<Design, DesignError> {
-    hybank::design::design(spec, &Options::without_proof())
+    hybank::design::design(spec, &DesignOptions::without_proof())
 }
 
 struct Case {

@@ -3,7 +3,7 @@
 //! is within 0.1 dB of the best.
 
 use crate::support::specs::butterworth;
-use hybank::design::{DesignError, Options, Sizing, analyze_mean, design};
+use hybank::design::{DesignError, DesignOptions, Sizing, analyze_mean, design};
 use hybank::spec::{ChannelSpec, DesignSpec, Method, Spec};
 use hybank::units::Seconds;
 use std::f64::consts::TAU;
@@ -30,7 +30,7 @@ fn error(spec: &Spec, latency: usize) -> f64 {
         spec.design =
             DesignSpec { order: spec.design.order, ..DesignSpec::new(Method::H2, spec.design.taps) };
     }
-    match design(&spec, &Options::without_proof()) {
+    match design(&spec, &DesignOptions::without_proof()) {
         Ok(found) => {
             let mean = analyze_mean(&found.bank).unwrap();
             mean.rms_error.hypot(mean.output_noise)
@@ -121,12 +121,14 @@ fn interleaved_converters_need_three_samples_of_latency() {
 
 fn gamma(spec: &Spec, latency: usize) -> f64 {
     let spec = Spec { latency: Some(latency), ..spec.clone() };
-    design(&spec, &Options::without_proof()).unwrap().bank.gamma.norm.unwrap()
+    design(&spec, &DesignOptions::without_proof()).unwrap().bank.gamma.norm.unwrap()
 }
 
 fn refusal(spec: &Spec, latency: usize) -> DesignError {
     let spec = Spec { latency: Some(latency), ..spec.clone() };
-    design(&spec, &Options::without_proof()).err().unwrap_or_else(|| panic!("latency {latency} is reached"))
+    design(&spec, &DesignOptions::without_proof())
+        .err()
+        .unwrap_or_else(|| panic!("latency {latency} is reached"))
 }
 
 /// With 32 taps the samples of latency 1000 are too old for any tap, and so are those before a long delay.
@@ -175,7 +177,7 @@ fn a_common_delay_adds_to_the_latency() {
     };
     for method in [Method::Fir, Method::Iir, Method::H2, Method::Sinc, Method::Separation] {
         let designed =
-            |common: f64| design(&with_delay(method, common), &Options::without_proof()).unwrap().bank;
+            |common: f64| design(&with_delay(method, common), &DesignOptions::without_proof()).unwrap().bank;
         let (near, far) = (designed(0.0), designed(20_001.0));
         assert_eq!(far.latency, near.latency + 20_001, "{method:?}");
         let [near, far] = [near, far].map(|bank| bank.gamma.norm.unwrap());

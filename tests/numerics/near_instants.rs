@@ -1,7 +1,7 @@
 //! Delays next to whole fast periods and next to one another, against closed forms.
 
 use crate::support::specs::{alike, low_pass, with_taps};
-use hybank::design::{Options, ProofSearch, design, judge_taps};
+use hybank::design::{DesignOptions, ProofSearch, design, judge_taps};
 use hybank::spec::{Family, FilterSpec, Passband, Spec};
 use hybank::units::Hertz;
 use std::f64::consts::PI;
@@ -23,7 +23,7 @@ fn a_delay_next_to_a_whole_one_is_not_taken_for_it() {
              [[channel]]\ndelay = {delay:?}\n[design]\nmethod = \"fir\"\ntaps = 1\n"
         );
         let spec = Spec::from_toml(&text, "spec.toml").unwrap();
-        let gamma = design(&spec, &Options::default()).unwrap().bank.gamma;
+        let gamma = design(&spec, &DesignOptions::default()).unwrap().bank.gamma;
         let late = delay - f64::from(latency);
         // A later sample can be used as it is; nothing older than the target's can.
         let expected = (-0.5 * pole * f64::exp_m1(-2.0 * pole * late.abs())).sqrt();
@@ -79,7 +79,7 @@ fn the_norm_lies_in_the_proven_interval() {
     let filter = low_pass(Family::Butterworth, 2, 0.2 * PI);
     for ratio in [1, 2] {
         let spec = with_taps(alike(&filter, ratio, 6, &[1.2, 1.20000000012]), 12);
-        let designed = design(&spec, &Options::default()).unwrap();
+        let designed = design(&spec, &DesignOptions::default()).unwrap();
         let (norm, proven) = (designed.bank.gamma.norm.unwrap(), designed.proof.unwrap());
         let inside = proven.attained * (1.0 - 1e-9) <= norm && norm <= proven.upper;
         assert!(inside, "{ratio}: {norm:e} {proven:?}");
@@ -92,7 +92,7 @@ fn the_norm_lies_in_the_proven_interval() {
 fn delays_a_millionth_apart_are_resolved() {
     for apart in [1e-3, 1e-6] {
         let spec = with_taps(alike(&low_pass(Family::Butterworth, 2, 0.5), 2, 4, &[0.6, 0.6 + apart]), 8);
-        let found = design(&spec, &Options::without_proof()).unwrap().bank.gamma;
+        let found = design(&spec, &DesignOptions::without_proof()).unwrap().bank.gamma;
         let (lower, norm) = (found.lower.unwrap(), found.norm.unwrap());
         assert!(lower <= norm && lower > 0.99 * norm, "{apart:e}: {found:?}");
     }

@@ -4,7 +4,7 @@
 use crate::support::random::Random;
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::uncertainty::BoxStudy;
-use hybank::design::{Design, Options, analyze_mean, design, norm_at};
+use hybank::design::{Design, DesignOptions, analyze_mean, design, norm_at};
 use hybank::spec::{ErrorBox, ErrorPoint, Spec};
 use hybank::units::{FastPeriods, Seconds};
 use hybank::verify::verify;
@@ -21,7 +21,7 @@ fn spec(design: &str) -> Spec {
     Spec::from_toml(&text, "spec.toml").unwrap()
 }
 
-fn designed(spec: &Spec, options: &Options<'_>) -> Design {
+fn designed(spec: &Spec, options: &DesignOptions<'_>) -> Design {
     design(spec, options).unwrap()
 }
 
@@ -37,8 +37,8 @@ fn a_bank_for_unequal_rates_is_one_for_all_samples_of_a_frame() {
         assert_eq!((own.ratio, own.layout().samples().to_vec(), own.wait()), (6, vec![3, 2], 4));
         let by_hand = own.per_sample();
         assert_eq!((by_hand.channels.len(), by_hand.wait()), (5, 0));
-        let found = designed(&own, &Options::default());
-        let hand = designed(&by_hand, &Options::without_proof());
+        let found = designed(&own, &DesignOptions::default());
+        let hand = designed(&by_hand, &DesignOptions::without_proof());
         let gamma = |design: &Design| design.bank.gamma.norm.unwrap();
         assert!(
             (gamma(&found) / gamma(&hand) - 1.0).abs() < 1e-6,
@@ -70,7 +70,7 @@ fn equal_rates_are_no_rates() {
     let plain = read("", "ratio = 2");
     assert_eq!(read(", rate = \"24 kHz\"", ""), plain);
     assert_eq!(read(", rate = \"24 kHz\"", "ratio = 2"), plain);
-    let json = designed(&plain, &Options::without_proof()).bank.to_json().unwrap();
+    let json = designed(&plain, &DesignOptions::without_proof()).bank.to_json().unwrap();
     assert!(!json.contains("rate\"") && !json.contains("samples"), "{json}");
 }
 
@@ -79,7 +79,7 @@ fn equal_rates_are_no_rates() {
 #[test]
 fn the_samples_of_a_converter_share_its_errors() {
     let own = spec("design = { method = \"fir\", taps = 12 }");
-    let bank = designed(&own, &Options::without_proof()).bank;
+    let bank = designed(&own, &DesignOptions::without_proof()).bank;
     let errors = ErrorBox {
         delays: vec![FastPeriods(0.0), FastPeriods(0.1)],
         gains: vec![0.02, 0.0],
@@ -128,11 +128,14 @@ fn the_samples_of_a_converter_share_its_errors() {
 #[test]
 fn robust_designs_know_one_error_per_converter() {
     let box_of = "uncertainty = { delay = [0, 0.1], reference = 1 }\n";
-    let nominal = designed(&spec("design = { method = \"fir\", taps = 12 }"), &Options::without_proof()).bank;
+    let nominal =
+        designed(&spec("design = { method = \"fir\", taps = 12 }"), &DesignOptions::without_proof()).bank;
     let errors = ErrorBox { delays: vec![FastPeriods(0.0), FastPeriods(0.1)], ..ErrorBox::none(2) };
     let careless = BoxStudy::new(&nominal, &errors).unwrap();
-    let robust =
-        designed(&spec(&format!("{box_of}design = {{ method = \"fir\", taps = 12 }}")), &Options::default());
+    let robust = designed(
+        &spec(&format!("{box_of}design = {{ method = \"fir\", taps = 12 }}")),
+        &DesignOptions::default(),
+    );
     let stated = robust.bank.gamma.worst_case.unwrap_or_else(|| panic!("{:?}", robust.box_unproven));
     assert!(stated < careless.upper, "{stated} {careless:?}");
     let found = BoxStudy::new(&robust.bank, &errors).unwrap();
@@ -153,10 +156,10 @@ fn mean_square_banks_average_over_one_error_per_converter() {
     };
     let averaged = designed(
         &table(&format!("uncertainty = {{ delay = [0, {half}], reference = 1 }}\n")),
-        &Options::without_proof(),
+        &DesignOptions::without_proof(),
     )
     .bank;
-    let nominal = designed(&table(""), &Options::without_proof()).bank;
+    let nominal = designed(&table(""), &DesignOptions::without_proof()).bank;
     // Nodes and weights for the weight exp(-x^2).
     let nodes = [
         (0.0, 0.8102646175568073),

@@ -3,7 +3,7 @@
 
 use crate::support::random::Random;
 use crate::support::specs::{alike, amplify, low_pass, thesis};
-use hybank::design::{Design, Options, analyze, design};
+use hybank::design::{Design, DesignOptions, analyze, design};
 use hybank::spec::{Family, FilterSpec, Method, Spec};
 use hybank::verify::verify;
 use std::f64::consts::TAU;
@@ -28,8 +28,10 @@ fn a_channel_a_period_later_adds_nothing_and_harms_nothing() {
     let front_end = filter(Family::Butterworth, 4, 0.2);
     for method in [Method::Iir, Method::H2] {
         let four =
-            design(&by(method, alike(&front_end, 2, 8, &[0.2, 1.1, 2.2, 3.1])), &Options::default()).unwrap();
-        let two = design(&by(method, alike(&front_end, 2, 8, &[0.2, 1.1])), &Options::default()).unwrap();
+            design(&by(method, alike(&front_end, 2, 8, &[0.2, 1.1, 2.2, 3.1])), &DesignOptions::default())
+                .unwrap();
+        let two =
+            design(&by(method, alike(&front_end, 2, 8, &[0.2, 1.1])), &DesignOptions::default()).unwrap();
         assert!((norm(&four) / norm(&two) - 1.0).abs() < 1e-6, "{} {}", norm(&four), norm(&two));
         let noise_gain = analyze(&four.bank, &[]).unwrap().mean.noise_gain;
         assert!(noise_gain < 10.0, "{noise_gain}");
@@ -46,16 +48,16 @@ fn a_channel_a_period_later_adds_nothing_and_harms_nothing() {
 #[test]
 fn one_converter_twice_is_one_converter() {
     let front_end = filter(Family::Butterworth, 4, 0.2);
-    let two = design(&alike(&front_end, 2, 1, &[0.2, 2.2]), &Options::default()).unwrap();
-    let one = design(&alike(&front_end, 2, 1, &[0.2]), &Options::default()).unwrap();
+    let two = design(&alike(&front_end, 2, 1, &[0.2, 2.2]), &DesignOptions::default()).unwrap();
+    let one = design(&alike(&front_end, 2, 1, &[0.2]), &DesignOptions::default()).unwrap();
     assert!((norm(&two) / norm(&one) - 1.0).abs() < 1e-6, "{} {}", norm(&two), norm(&one));
 }
 
 #[test]
 fn four_interleaved_converters_at_half_the_ratio_are_designed() {
     let front_end = filter(Family::Butterworth, 4, 0.2);
-    let four = design(&alike(&front_end, 2, 8, &[0.0, 1.0, 2.0, 3.0]), &Options::default()).unwrap();
-    let two = design(&alike(&front_end, 2, 8, &[0.0, 1.0]), &Options::default()).unwrap();
+    let four = design(&alike(&front_end, 2, 8, &[0.0, 1.0, 2.0, 3.0]), &DesignOptions::default()).unwrap();
+    let two = design(&alike(&front_end, 2, 8, &[0.0, 1.0]), &DesignOptions::default()).unwrap();
     assert!(norm(&four) <= norm(&two) * (1.0 + 1e-6) + 1e-12, "{} {}", norm(&four), norm(&two));
 }
 
@@ -65,7 +67,7 @@ fn the_noncausal_bound_counts_repeated_channels_once() {
     for method in [Method::Iir, Method::Fir] {
         let mut spec = by(method, thesis(10, &[0.6, 1.2, 2.6]));
         spec.design.taps = (method == Method::Fir).then_some(22);
-        let three = design(&spec, &Options::default()).unwrap();
+        let three = design(&spec, &DesignOptions::default()).unwrap();
         assert!((three.bank.gamma.noncausal.unwrap() - 0.03993).abs() < 2e-5, "{:?}", three.bank.gamma);
         assert!((norm(&three) / 0.03993 - 1.0).abs() < 1e-3, "{}", norm(&three));
         verify(&three.bank).unwrap();
@@ -79,7 +81,7 @@ fn proportional_filters_are_one_measurement() {
         let mut spec = by(method, thesis(10, &[1.2, 0.6, 0.6]));
         spec.design.taps = (method == Method::Fir).then_some(22);
         amplify(&mut spec.channels[2].filter, 3.7);
-        let three = design(&spec, &Options::default()).unwrap();
+        let three = design(&spec, &DesignOptions::default()).unwrap();
         assert!((norm(&three) / 0.03993 - 1.0).abs() < 1e-3, "{}", norm(&three));
         let proven = verify(&three.bank).unwrap();
         assert!((proven.upper / 0.03993 - 1.0).abs() < 1e-3, "{proven:?}");
@@ -118,7 +120,7 @@ fn repeats_change_no_recursive_bank() {
         let (plain, repeated) = plants(seed);
         for method in [Method::Iir, Method::H2] {
             let [plain, repeated] = [&plain, &repeated]
-                .map(|spec| design(&by(method, spec.clone()), &Options::default()).unwrap());
+                .map(|spec| design(&by(method, spec.clone()), &DesignOptions::default()).unwrap());
             let excess = norm(&repeated) / norm(&plain) - 1.0;
             worst = worst.max(excess);
             let [least, other] = [&plain, &repeated].map(|found| found.bank.gamma.noncausal.unwrap());

@@ -1,14 +1,14 @@
 //! The form in which recursive banks are written: delay lines and parallel sections, which the runtime
 //! recognises.
 
-use hybank::bank::{Bank, StateSpace, SynthesisFilters};
+use hybank::bank::{Bank, StateMatrices, SynthesisFilters};
 use hybank::design::{Design, DesignError, analyze};
 use hybank::runtime::{Options, Stream};
 use hybank::spec::Spec;
 
 /// Designs without a search for proofs, which other tests are about.
 fn design(spec: &Spec) -> Result<Design, DesignError> {
-    hybank::design::design(spec, &hybank::design::Options::without_proof())
+    hybank::design::design(spec, &hybank::design::DesignOptions::without_proof())
 }
 
 fn spec(method: &str, delays: &[f64], latency: usize, target: &str) -> Spec {
@@ -24,7 +24,7 @@ fn spec(method: &str, delays: &[f64], latency: usize, target: &str) -> Spec {
 const DOUBLE_POLE: &str = "{ num = [0.25], den = [1.0, 1.0, 0.25] }";
 const BUTTERWORTH: &str = "{ family = \"butterworth\", order = 5, cutoff = 0.2 }";
 
-fn block(bank: &Bank) -> &StateSpace {
+fn block(bank: &Bank) -> &StateMatrices {
     match &bank.filters {
         SynthesisFilters::StateSpace(block) => block,
         SynthesisFilters::Fir(_) => panic!("a recursive bank"),
@@ -32,7 +32,7 @@ fn block(bank: &Bank) -> &StateSpace {
 }
 
 /// The definition of a state-space bank, row by row.
-fn slow_run(filter: &StateSpace, input: &[f64]) -> Vec<f64> {
+fn slow_run(filter: &StateMatrices, input: &[f64]) -> Vec<f64> {
     let dot = |row: &[f64], v: &[f64]| row.iter().zip(v).map(|(a, b)| a * b).sum::<f64>();
     let mut x = vec![0.0; filter.a.len()];
     let mut out = Vec::new();

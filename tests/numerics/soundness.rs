@@ -4,7 +4,7 @@
 use crate::support::random::Random;
 use crate::support::specs::{alike, tf, thesis, with_taps};
 use hybank::bank::{Bank, Gamma, SynthesisFilters};
-use hybank::design::{Options, certify, design};
+use hybank::design::{DesignOptions, certify, design};
 use hybank::spec::{DesignSpec, Method, Spec};
 use hybank::units::Seconds;
 use hybank::verify::verify;
@@ -115,7 +115,7 @@ fn no_interval_excludes_the_true_norm_for_any_delay() {
 }
 
 fn proven(spec: &Spec) -> Bank {
-    let found = design(spec, &Options::default()).unwrap();
+    let found = design(spec, &DesignOptions::default()).unwrap();
     found.proof.unwrap();
     found.bank
 }

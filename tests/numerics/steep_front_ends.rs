@@ -3,7 +3,7 @@
 
 use crate::support::random::Random;
 use crate::support::specs::{alike, low_pass, with_taps};
-use hybank::design::{Design, Options, analyze, design};
+use hybank::design::{Design, DesignOptions, analyze, design};
 use hybank::spec::{Family, FilterSpec, Method, Spec};
 use std::f64::consts::TAU;
 
@@ -20,12 +20,12 @@ fn norm(design: &Design) -> f64 {
 fn a_sample_just_inside_the_period_costs_nothing() {
     let front_end = filter(Family::Butterworth, 8, 0.1);
     let spec = alike(&front_end, 2, 0, &[0.2, 0.9, 1.6]);
-    let iir = design(&spec, &Options::without_proof()).unwrap();
-    let fir = design(&with_taps(spec.clone(), 32), &Options::without_proof()).unwrap();
+    let iir = design(&spec, &DesignOptions::without_proof()).unwrap();
+    let fir = design(&with_taps(spec.clone(), 32), &DesignOptions::without_proof()).unwrap();
     assert!(norm(&iir) <= norm(&fir) * (1.0 + 1e-5), "{} {}", norm(&iir), norm(&fir));
     let mut mean_square = spec;
     mean_square.design.method = Method::H2;
-    let h2 = design(&mean_square, &Options::default()).unwrap();
+    let h2 = design(&mean_square, &DesignOptions::default()).unwrap();
     let rms = analyze(&h2.bank, &[]).unwrap().mean.rms_error;
     assert!((rms / 0.000500 - 1.0).abs() < 2e-3, "{rms}");
 }
@@ -44,7 +44,7 @@ fn plant(seed: u64) -> Spec {
 fn no_taps_do_better_than_iir() {
     let excess = |seed| {
         let design = |spec: Spec| {
-            design(&spec, &Options::without_proof()).unwrap_or_else(|error| panic!("{seed}: {error}"))
+            design(&spec, &DesignOptions::without_proof()).unwrap_or_else(|error| panic!("{seed}: {error}"))
         };
         let spec = plant(seed);
         norm(&design(spec.clone())) / norm(&design(with_taps(spec, 32))) - 1.0

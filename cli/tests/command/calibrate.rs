@@ -3,7 +3,7 @@
 use crate::support::random::Random;
 use crate::support::{Desk, number, text, wav};
 use hybank::analog::StrictlyProper;
-use hybank::design::Options;
+use hybank::design::DesignOptions;
 use hybank::spec::Spec;
 use hybank::units::RadiansPerFastPeriod;
 use serde_json::Value;
@@ -76,9 +76,10 @@ fn with<'a>(head: &[&'a str], names: &'a [String], tail: &[&'a str]) -> Vec<&'a 
 /// `bank.json` for a spec, without the search for its proof.
 pub(crate) fn design(desk: &Desk, spec: &str) {
     let text = String::from_utf8(desk.read(spec)).unwrap();
-    let bank = hybank::design::design(&Spec::from_toml(&text, spec).unwrap(), &Options::without_proof())
-        .unwrap()
-        .bank;
+    let bank =
+        hybank::design::design(&Spec::from_toml(&text, spec).unwrap(), &DesignOptions::without_proof())
+            .unwrap()
+            .bank;
     desk.write("bank.json", bank.to_json().unwrap());
 }
 

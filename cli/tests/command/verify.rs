@@ -7,7 +7,7 @@
 use crate::support::random::Random;
 use crate::support::{Desk, THESIS};
 use hybank::bank::{Bank, check_digest};
-use hybank::design::{Options, design, prove};
+use hybank::design::{DesignOptions, design, prove};
 use hybank::spec::Spec;
 use hybank::verify::verify;
 use serde_json::Value;
@@ -26,7 +26,7 @@ fn designed(method: &str) -> Bank {
         "reduced" => hurried().replace("\"fir\"\ntaps = 12", "\"iir\"\norder = 1"),
         _ => hurried().replace("\"fir\"\ntaps = 12", &format!("\"{method}\"")),
     };
-    let design = design(&Spec::from_toml(&text, "spec.toml").unwrap(), &Options::default()).unwrap();
+    let design = design(&Spec::from_toml(&text, "spec.toml").unwrap(), &DesignOptions::default()).unwrap();
     assert!(design.proof.is_ok(), "{:?}", design.proof);
     design.bank
 }

@@ -8,7 +8,7 @@ use crate::spec::{
 use crate::units::Seconds;
 
 use super::{
-    Bank, BoxProof, Certificate, FixedPoint, GainWitness, Gamma, NormBound, Proof, StateSpace,
+    Bank, BoxProof, Certificate, FixedPoint, GainWitness, Gamma, NormBound, Proof, StateMatrices,
     SynthesisFilters,
 };
 
@@ -277,7 +277,7 @@ fn check_sizes(path: &str, values: &[f64]) -> Checked {
     Err(refused(&path, format!("{value} {rule}")))
 }
 
-fn check_block(block: &StateSpace, ratio: usize, channels: usize) -> Checked {
+fn check_block(block: &StateMatrices, ratio: usize, channels: usize) -> Checked {
     let n = block.a.len();
     check_matrix("state_space.a", &block.a, n, n, "a is n x n, n the number of states")?;
     check_matrix("state_space.b", &block.b, n, channels, "b is n x N, N the number of channels")?;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::check::check_length;
 use super::digest::{check_form, digest};
-use super::{Bank, FORMAT, FixedPoint, Gamma, Proof, StateSpace, SynthesisFilters, VERSION, layout};
+use super::{Bank, FORMAT, FixedPoint, Gamma, Proof, StateMatrices, SynthesisFilters, VERSION, layout};
 use crate::messages::{Quoted, of_json};
 use crate::spec::{
     At, DesignOverrides, Method, OneOrEach, Refusal, Spec, SpecProblem, SpecTable, no_models, refusal,
@@ -24,8 +24,8 @@ struct BankTable<S> {
     ratio: usize,
     latency: usize,
     method: Method,
-    channels: Vec<ChannelTable>,
-    state_space: Option<StateSpace>,
+    channels: Vec<ConverterTable>,
+    state_space: Option<StateMatrices>,
     #[serde(skip_serializing_if = "Option::is_none")]
     fixed_point: Option<FixedPoint>,
     gamma: Option<Gamma>,
@@ -41,7 +41,7 @@ struct BankTable<S> {
 /// A converter. What a reader takes for granted is left out.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct ChannelTable {
+struct ConverterTable {
     delay: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     samples: Option<usize>,
@@ -124,7 +124,7 @@ impl Bank {
 
     fn table(&self) -> BankTable<&Spec> {
         let unless = |value: f64, default: f64| (value != default).then_some(value);
-        let channel = |i: usize| ChannelTable {
+        let channel = |i: usize| ConverterTable {
             delay: self.delays[i].0,
             samples: (self.samples[i] != 1).then_some(self.samples[i]),
             gain: unless(self.gains[i], 1.0),
@@ -214,7 +214,7 @@ impl BankTable<SpecTable> {
         self.digest.as_deref().map_or(Ok(()), check_form)?;
         let spec = self.spec.map(|table| table.spec(DesignOverrides::default(), &no_models));
         let spec = spec.transpose().map_err(|error| error.inside("spec"))?;
-        let of_channels = |value: fn(&ChannelTable) -> f64| self.channels.iter().map(value).collect();
+        let of_channels = |value: fn(&ConverterTable) -> f64| self.channels.iter().map(value).collect();
         Ok(Bank {
             spec,
             fast_period: Seconds(self.fast_period),
@@ -234,7 +234,7 @@ impl BankTable<SpecTable> {
 }
 
 /// Either every channel has taps, or there is a state-space block.
-fn filters(block: Option<StateSpace>, channels: Vec<ChannelTable>) -> Result<SynthesisFilters, Refusal> {
+fn filters(block: Option<StateMatrices>, channels: Vec<ConverterTable>) -> Result<SynthesisFilters, Refusal> {
     let with_taps = channels.iter().position(|channel| channel.taps.is_some());
     match (block, with_taps) {
         (Some(block), None) => Ok(SynthesisFilters::StateSpace(block)),
@@ -253,7 +253,7 @@ fn filters(block: Option<StateSpace>, channels: Vec<ChannelTable>) -> Result<Syn
     }
 }
 
-impl ChannelTable {
+impl ConverterTable {
     /// The taps of each sample of a frame.
     fn tap_lists(self) -> Result<Vec<Vec<f64>>, Refusal> {
         let remedy = "give the taps of every channel, or a state_space for all";

@@ -19,7 +19,7 @@ pub use digest::check_digest;
 pub use proof::{BoxProof, Certificate, GainWitness, NormBound, Proof};
 pub use taps::FixedPoint;
 
-pub use crate::runtime::StateSpace;
+pub use crate::runtime::StateMatrices;
 pub use crate::spec::{FrameLayout, FrameSample};
 
 use crate::runtime::{BuildError, Options, Plan, Shape};
@@ -72,7 +72,7 @@ pub enum SynthesisFilters {
     /// `taps[i][n]` = `f_i[n]` at the fast rate, i in the order of [`FrameLayout::iter`].
     Fir(Vec<Vec<f64>>),
     /// One block per slow period.
-    StateSpace(StateSpace),
+    StateSpace(StateMatrices),
 }
 
 /// gamma = ||K|| in normalised time (h = 1), and its bounds; `None` if unknown.

@@ -31,7 +31,7 @@ fn fir() -> Bank {
 }
 
 fn state_space() -> Bank {
-    let block = StateSpace {
+    let block = StateMatrices {
         a: vec![vec![0.5, 0.1, 0.0], vec![0.0, -0.25, 1e-300], vec![1.0 / 7.0, 0.0, 0.0]],
         b: vec![vec![1.0, 2.0], vec![3.0, 4.0], vec![5.0, 6.0]],
         c: vec![vec![1.0, 0.0, 0.5], vec![0.0, 1.0, 0.5]],
@@ -178,8 +178,12 @@ fn a_bank_made_elsewhere_reads() {
 
 #[test]
 fn a_static_block_has_no_states() {
-    let block =
-        StateSpace { a: vec![], b: vec![], c: vec![vec![], vec![]], d: vec![vec![1.0, 0.0], vec![0.0, 1.0]] };
+    let block = StateMatrices {
+        a: vec![],
+        b: vec![],
+        c: vec![vec![], vec![]],
+        d: vec![vec![1.0, 0.0], vec![0.0, 1.0]],
+    };
     let bank = Bank { filters: SynthesisFilters::StateSpace(block), ..state_space() };
     assert_eq!(Bank::from_json(&bank.to_json().unwrap(), "b.json").unwrap(), bank);
 }

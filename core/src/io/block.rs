@@ -4,7 +4,7 @@
 //! and the imaginary parts of complex samples lie apart, each frame after frame.
 
 use super::{StreamHeader, TimeInterleaving};
-use crate::runtime::{Input, Interleaved, Isa, PcmFrames, Precision, Sample, SampleLayout};
+use crate::runtime::{FrameSource, Interleaved, Isa, PcmFrames, Precision, Sample, SampleLayout};
 use std::collections::TryReserveError;
 use std::io;
 use std::ops::Range;
@@ -214,7 +214,7 @@ fn append(frames: &PcmFrames<'_>, to: &mut Numbers) -> Result<(), TryReserveErro
     with_numbers!(to, numbers => {
         numbers.try_reserve(more)?;
         numbers.resize(begin + more, Sample::from_f64(0.0));
-        (frames as &dyn Input).load(Isa::detect(), 0, &mut numbers[begin..]);
+        (frames as &dyn FrameSource).load(Isa::detect(), 0, &mut numbers[begin..]);
     });
     Ok(())
 }
@@ -261,7 +261,7 @@ impl<'a> NumberFrames<'a> {
         }
     }
 
-    fn input(&self) -> &dyn Input {
+    fn input(&self) -> &dyn FrameSource {
         match self {
             Self::F32(frames) => frames,
             Self::F64(frames) => frames,
@@ -269,7 +269,7 @@ impl<'a> NumberFrames<'a> {
     }
 }
 
-impl Input for NumberFrames<'_> {
+impl FrameSource for NumberFrames<'_> {
     fn channels(&self) -> usize {
         self.input().channels()
     }

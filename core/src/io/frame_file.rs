@@ -6,7 +6,7 @@ use super::full_scale::{Scaling, StatedScale};
 use super::sigmf_reader::SigmfReader;
 use super::wav::WavReader;
 use super::{IoError, StreamHeader, is_sigmf, sigmf_files};
-use crate::runtime::{Input, Isa, PcmFrames, Sample};
+use crate::runtime::{FrameSource, Isa, PcmFrames, Sample};
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
@@ -93,7 +93,7 @@ impl FrameFile {
         let (block, _) = self.scaled(&self.stored(first, count)?)?;
         let frames = block.view(0..block.frames(), 1).real;
         let mut numbers = vec![T::default(); frames.frames() * frames.channels()];
-        (&frames as &dyn Input).load(Isa::detect(), 0, &mut numbers);
+        (&frames as &dyn FrameSource).load(Isa::detect(), 0, &mut numbers);
         Ok(numbers)
     }
 

@@ -2,7 +2,7 @@
 
 use super::{Arrival, IoError, MultiReader, RecordedFrames};
 use crate::messages::Quoted;
-use crate::runtime::Input;
+use crate::runtime::FrameSource;
 use std::collections::TryReserveError;
 
 /// Recordings that are not read.

@@ -4,7 +4,9 @@
 use super::gaps::{GapEstimator, GapFiller};
 use super::{Gap, Outcome};
 use crate::bank::Bank;
-use crate::runtime::{Input, Interleaved, Isa, Output, Plan, ProcessError, SplitOutput, Stream, ThreadPool};
+use crate::runtime::{
+    FrameSink, FrameSource, Interleaved, Isa, Plan, ProcessError, SplitOutput, Stream, ThreadPool,
+};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -130,16 +132,16 @@ impl<'a> Fusion<'a> {
     /// `output`; returns how many.
     pub(super) fn step(
         &mut self,
-        parts: &[impl Input],
+        parts: &[impl FrameSource],
         most: usize,
         output: &mut dyn SplitOutput,
     ) -> Result<usize, ProcessError> {
-        let frames = parts.first().map_or(0, Input::frames);
+        let frames = parts.first().map_or(0, FrameSource::frames);
         match &mut self.gaps {
             None => self.filter(parts, frames, most, output),
             Some(gaps) => {
                 let wanted = self.streams[0].channels();
-                if let Some(given) = parts.iter().map(Input::channels).find(|given| *given != wanted) {
+                if let Some(given) = parts.iter().map(FrameSource::channels).find(|given| *given != wanted) {
                     return Err(ProcessError::Channels { given, wanted });
                 }
                 let frames = gaps.fill(parts);
@@ -166,7 +168,7 @@ impl<'a> Fusion<'a> {
 
     fn filter(
         &mut self,
-        parts: &[impl Input],
+        parts: &[impl FrameSource],
         frames: usize,
         most: usize,
         output: &mut dyn SplitOutput,
@@ -240,7 +242,7 @@ impl<'a> Fusion<'a> {
 /// Filters frames; of their outputs only those in `kept` are stored, if not all are.
 fn run(
     stream: &mut Stream,
-    input: &dyn Input,
+    input: &dyn FrameSource,
     kept: Option<Range<usize>>,
     output: &mut dyn SplitOutput,
     workers: Option<&ThreadPool>,
@@ -254,7 +256,7 @@ fn run(
 
 /// Room for some of the outputs of a call; the others are dropped before they are encoded.
 struct Kept<'a> {
-    output: &'a mut dyn Output,
+    output: &'a mut dyn FrameSink,
     range: Range<usize>,
 }
 
@@ -266,7 +268,7 @@ impl Kept<'_> {
     }
 }
 
-impl Output for Kept<'_> {
+impl FrameSink for Kept<'_> {
     fn capacity(&self) -> usize {
         usize::MAX
     }

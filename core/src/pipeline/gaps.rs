@@ -7,7 +7,7 @@
 
 use super::cost::{Cost, Costs};
 use crate::bank::{Bank, FrameLayout, FrameSample};
-use crate::runtime::{Input, Isa, Plan};
+use crate::runtime::{FrameSource, Isa, Plan};
 use crate::units::Decibels;
 use std::collections::HashMap;
 use std::fmt;
@@ -135,8 +135,8 @@ impl GapFiller {
     }
 
     /// Takes the next frames of all `parts` of the samples, and returns how many come out.
-    pub(super) fn fill(&mut self, parts: &[impl Input]) -> usize {
-        let frames = parts.first().map_or(0, Input::frames);
+    pub(super) fn fill(&mut self, parts: &[impl FrameSource]) -> usize {
+        let frames = parts.first().map_or(0, FrameSource::frames);
         self.forget();
         let begin = self.known.len();
         let end = begin + frames * self.samples.len();

@@ -1,7 +1,7 @@
 //! Runs a bank on recordings, streams or signals in memory.
 //!
 //! ```text
-//! Input -> missing samples estimated -> runtime::Stream -> latency dropped -> runtime::Output
+//! Input -> missing samples estimated -> runtime::Stream -> latency dropped -> runtime::FrameSink
 //! ```
 //!
 //! One loop (`fusion`) estimates missing samples, runs the bank, drops the latency, and marks the samples

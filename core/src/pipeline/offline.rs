@@ -4,7 +4,7 @@ use super::fusion::Fusion;
 use super::{Outcome, PipelineError, Settings};
 use crate::bank::{Bank, SynthesisFilters};
 use crate::runtime::{
-    Frames, Input, Options, Plan, Planar, Precision, ProcessError, SplitOutput, ThreadPool,
+    FrameSource, Frames, Options, Plan, Planar, Precision, ProcessError, SplitOutput, ThreadPool,
 };
 
 /// Samples of a step whose frames are copied: those in which missing samples are estimated, and those
@@ -27,7 +27,7 @@ const MULTIPLY_ADDS_PER_STORE: usize = 8;
 /// with the signal.
 ///
 /// `parts` is one input of real samples, or the real and the imaginary parts of complex ones; then
-/// [`Output::select`](crate::runtime::Output::select) says which of them `output` stores. `stop` is called
+/// [`FrameSink::select`](crate::runtime::FrameSink::select) says which of them `output` stores. `stop` is called
 /// every few milliseconds of work, on the thread of the caller, and ends the fusion if it returns true.
 ///
 /// # Errors
@@ -36,7 +36,7 @@ const MULTIPLY_ADDS_PER_STORE: usize = 8;
 pub fn fuse(
     bank: &Bank,
     plan: &Plan,
-    parts: &[&dyn Input],
+    parts: &[&dyn FrameSource],
     output: &mut dyn SplitOutput,
     settings: Settings<'_>,
     stop: &dyn Fn() -> bool,
@@ -98,7 +98,12 @@ pub fn fused(bank: &Bank, channels: &[Vec<f64>], settings: Settings<'_>) -> Resu
     Ok(output)
 }
 
-fn check(plan: &Plan, parts: &[&dyn Input], capacity: usize, wanted: usize) -> Result<(), ProcessError> {
+fn check(
+    plan: &Plan,
+    parts: &[&dyn FrameSource],
+    capacity: usize,
+    wanted: usize,
+) -> Result<(), ProcessError> {
     let wrong = parts.iter().map(|part| part.channels()).find(|given| *given != plan.channels());
     if let Some(given) = wrong {
         return Err(ProcessError::Channels { given, wanted: plan.channels() });

@@ -4,14 +4,14 @@ use super::fusion::Fusion;
 use super::{Gap, Outcome, PipelineError, Settings};
 use crate::bank::Bank;
 use crate::io::{IoError, NumberFrames, PcmFormat, RecordedFrames};
-use crate::runtime::{Frames, Input, PcmOutput, Plan, SideBySide};
+use crate::runtime::{FrameSource, Frames, PcmOutput, Plan, SideBySide};
 
 /// Maximum size of the encoded output of one step for one thread: a share of the second-level cache.
 const STEP_BYTES: usize = 256 << 10;
 /// Steps of several threads are so many times as long, enough for the chunks of all.
 const PARALLEL_STEPS: usize = 8;
 
-/// Output samples with their mask.
+/// FrameSink samples with their mask.
 #[derive(Debug, Clone, Copy)]
 pub struct Block<'a> {
     /// Encoded samples.
@@ -65,12 +65,12 @@ impl<'a> Pipeline<'a> {
         self.fusion.stream().position()
     }
 
-    /// Output samples so far.
+    /// FrameSink samples so far.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// Output samples of the frames so far that wait for later frames, from which missing samples may have
+    /// FrameSink samples of the frames so far that wait for later frames, from which missing samples may have
     /// to be estimated; a flush brings them out.
     pub fn pending(&self) -> u64 {
         self.fusion.pending() as u64
@@ -146,7 +146,7 @@ impl<'a> Pipeline<'a> {
     ///
     /// # Errors
     /// As [`Pipeline::push`].
-    pub fn push_parts(&mut self, parts: &[&dyn Input], write: Write<'_>) -> Result<(), PipelineError> {
+    pub fn push_parts(&mut self, parts: &[&dyn FrameSource], write: Write<'_>) -> Result<(), PipelineError> {
         let frames = parts.first().map_or(0, |part| part.frames());
         let mut first = 0;
         while first < frames {
@@ -158,8 +158,8 @@ impl<'a> Pipeline<'a> {
         Ok(())
     }
 
-    fn step(&mut self, parts: &[impl Input], write: Write<'_>) -> Result<(), PipelineError> {
-        let frames = parts.first().map_or(0, Input::frames);
+    fn step(&mut self, parts: &[impl FrameSource], write: Write<'_>) -> Result<(), PipelineError> {
+        let frames = parts.first().map_or(0, FrameSource::frames);
         let mut output = room(&mut self.buffer, self.format, frames * self.fusion.outputs());
         let written = self.fusion.step(parts, usize::MAX, &mut output)?;
         self.clipped += output.clipped;

@@ -1,6 +1,6 @@
 //! Quantities in documents: a number in SI units, or a text with a unit.
 
-use super::{FullScale, QuantityError, Time, frequency, full_scale, rate, relative, time};
+use super::{FullScale, QuantityError, WrittenTime, frequency, full_scale, rate, relative, time};
 use crate::units::{Hertz, Seconds};
 use serde::de::{Deserialize, Deserializer, Error, Visitor};
 use std::fmt;
@@ -14,12 +14,12 @@ pub(crate) struct Rate(pub(crate) Hertz);
 pub(crate) struct Share(pub(crate) f64);
 
 /// How a quantity is read.
-struct Reader<T> {
+struct QuantityVisitor<T> {
     number: fn(f64) -> T,
     text: fn(&str) -> Result<T, QuantityError>,
 }
 
-impl<T> Visitor<'_> for Reader<T> {
+impl<T> Visitor<'_> for QuantityVisitor<T> {
     type Value = T;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -48,13 +48,13 @@ macro_rules! read_by {
     ($name:ty, $number:expr, $text:expr) => {
         impl<'de> Deserialize<'de> for $name {
             fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                deserializer.deserialize_any(Reader { number: $number, text: $text })
+                deserializer.deserialize_any(QuantityVisitor { number: $number, text: $text })
             }
         }
     };
 }
 
-read_by!(Time, |number| Self::Seconds(Seconds(number)), time);
+read_by!(WrittenTime, |number| Self::Seconds(Seconds(number)), time);
 read_by!(Hertz, Self, frequency);
 read_by!(Rate, |number| Self(Hertz(number)), |text| rate(text).map(Self));
 read_by!(Share, Self, |text| relative(text).map(Self));

@@ -99,7 +99,7 @@ fn people_read_six_digits_and_a_prefix() {
 
 #[test]
 fn samples_are_fast_periods() {
-    assert_eq!(time("0.25 samples"), Ok(Time::Samples(FastPeriods(0.25))));
+    assert_eq!(time("0.25 samples"), Ok(WrittenTime::Samples(FastPeriods(0.25))));
     assert_eq!(time("1sample").map(|time| time.in_seconds(Seconds(4.0))), Ok(Seconds(4.0)));
 }
 

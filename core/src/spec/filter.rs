@@ -199,7 +199,7 @@ pub struct MeasuredFilter {
     /// The file, as the spec names it: relative to the folder of the spec.
     pub path: String,
     /// What the file is.
-    pub measurement: Measurement,
+    pub measurement: MeasurementFile,
     /// Poles of the model.
     pub order: usize,
     /// A delay of the measurement that is not of the filter: a cable's, for example.
@@ -208,7 +208,7 @@ pub struct MeasuredFilter {
 
 /// The kinds of files.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Measurement {
+pub enum MeasurementFile {
     /// Touchstone; the scattering parameter, if it is named.
     Touchstone(Option<String>),
     /// Comma-separated frequency, decibels and degrees.

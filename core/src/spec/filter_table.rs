@@ -3,13 +3,13 @@
 use serde::Deserialize;
 
 use super::error::refused;
-use super::table::Table;
+use super::table::FromTable;
 use super::tables::{Pair, required};
 use super::{
-    Family, FilterModel, FilterModels, FilterSpec, MeasuredFilter, Measurement, OneOrEach, Passband, Refusal,
-    SpecError, SpecProblem,
+    Family, FilterModel, FilterModels, FilterSpec, MeasuredFilter, MeasurementFile, OneOrEach, Passband,
+    Refusal, SpecError, SpecProblem,
 };
-use crate::quantity::Time;
+use crate::quantity::WrittenTime;
 use crate::units::{Decibels, Hertz, Seconds};
 
 /// The keys of all forms. Which of them are given says which form it is.
@@ -30,11 +30,11 @@ pub(super) struct FilterTable {
     band: Option<Vec<Hertz>>,
     ripple_db: Option<f64>,
     attenuation_db: Option<f64>,
-    cascade: Option<Vec<Table<FilterTable>>>,
+    cascade: Option<Vec<FromTable<FilterTable>>>,
     touchstone: Option<String>,
     response: Option<String>,
     parameter: Option<String>,
-    deembed: Option<Time>,
+    deembed: Option<WrittenTime>,
 }
 
 /// The ways to write a filter.
@@ -125,7 +125,7 @@ impl FilterTable {
     }
 
     fn stages(self) -> Result<FilterSpec, SpecError> {
-        let stage = |(i, Table(stage)): (usize, Table<Self>)| {
+        let stage = |(i, FromTable(stage)): (usize, FromTable<Self>)| {
             stage.filter().map_err(|error| error.inside(&format!("cascade[{i}]")))
         };
         let stages = self.cascade.into_iter().flatten().enumerate();
@@ -177,8 +177,8 @@ impl FilterTable {
         Ok(MeasuredFilter {
             path: required(path, "touchstone", "name the file of the measurement")?,
             measurement: match is_touchstone {
-                true => Measurement::Touchstone(self.parameter),
-                false => Measurement::Response,
+                true => MeasurementFile::Touchstone(self.parameter),
+                false => MeasurementFile::Response,
             },
             order: required(self.order, "order", "give the number of poles of the model")?,
             deembed: self.deembed.map_or(Seconds(0.0), |delay| delay.in_seconds(h)),

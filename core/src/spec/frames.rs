@@ -120,12 +120,12 @@ impl FrameLayout {
 
 /// T = p / q fast periods.
 #[derive(Debug, Clone, Copy)]
-struct Step {
+struct SampleSpacing {
     p: usize,
     q: usize,
 }
 
-impl Step {
+impl SampleSpacing {
     /// The step of a converter of this rate, if it is a fraction of small numbers.
     fn of(rate: Hertz, fast_period: Seconds) -> Option<Self> {
         let step = 1.0 / (rate.0 * fast_period.0);
@@ -147,7 +147,7 @@ fn layout(fast_period: Seconds, rates: &[Hertz]) -> Result<FrameLayout, SpecErro
     let step = |(channel, &rate): (usize, &Hertz)| {
         let path = format!("channel[{channel}].rate");
         limits::check_rate(rate).at(&path)?;
-        Step::of(rate, fast_period).ok_or_else(|| {
+        SampleSpacing::of(rate, fast_period).ok_or_else(|| {
             let rule = format!(
                 "it is in no simple ratio to the fast rate of {}, so that the instants of the samples do not repeat; \
                  choose one that is",
@@ -156,14 +156,14 @@ fn layout(fast_period: Seconds, rates: &[Hertz]) -> Result<FrameLayout, SpecErro
             Refusal::new(path, range(rate.0, "Hz", rule))
         })
     };
-    let steps: Vec<Step> = rates.iter().enumerate().map(step).collect::<Result<_, _>>()?;
+    let steps: Vec<SampleSpacing> = rates.iter().enumerate().map(step).collect::<Result<_, _>>()?;
     // Factors are at most MAX_RATIO, so that products fit.
     let common = steps.iter().try_fold(1u64, |all, step| {
         let common = all / greatest_common_divisor(all, step.p as u64) * step.p as u64;
         (common <= u64::from(u32::MAX)).then_some(common)
     });
     let ratio = common.unwrap_or(u64::MAX);
-    let samples = |step: &Step| (ratio / step.p as u64).saturating_mul(step.q as u64);
+    let samples = |step: &SampleSpacing| (ratio / step.p as u64).saturating_mul(step.q as u64);
     let samples: Vec<u64> = steps.iter().map(samples).collect();
     let count = samples.iter().fold(0u64, |sum, &samples| sum.saturating_add(samples));
     if ratio > limits::MAX_RATIO as u64 || count > limits::MAX_CHANNELS as u64 {

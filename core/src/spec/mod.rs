@@ -31,7 +31,8 @@ pub use error::{Refusal, SpecError, SpecProblem};
 pub use error_box::{ConverterErrors, ErrorBox, ErrorPoint};
 pub(crate) use filter::no_models;
 pub use filter::{
-    Family, FilterModel, FilterModels, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB, MeasuredFilter, Measurement,
+    Family, FilterModel, FilterModels, FilterSpec, MAX_RIPPLE_DB, MIN_RIPPLE_DB, MeasuredFilter,
+    MeasurementFile,
 };
 pub use filter_rules::MAX_ORDER;
 pub use fitting::{Cutoff, Fitting, UnknownFitting};
@@ -45,7 +46,7 @@ pub use passband::Passband;
 pub(crate) use reading::refusal;
 pub use signal::{Band, ROUNDING_16_BITS, SignalSpec, SignalSpectrum, USUAL_RMS};
 pub use sizes::{MAX_ERROR_STATES, MAX_FRONT_END_STATES};
-pub(crate) use table::Table;
+pub(crate) use table::FromTable;
 pub(crate) use tables::SpecTable;
 pub use uncertainty::{ChannelCount, HALF_WIDTH, UncertaintySpec, check_delay_half_width, for_channels};
 pub(crate) use word_lengths::check_fraction_bits;
@@ -210,8 +211,8 @@ impl Spec {
         overrides: DesignOverrides,
         models: &FilterModels<'_>,
     ) -> Result<Self, SpecError> {
-        let table: Result<Table<SpecTable>, SpecError> = reading::of_data(data);
-        table.and_then(|Table(table)| table.spec(overrides, models)).map_err(|error| error.in_file(name))
+        let table: Result<FromTable<SpecTable>, SpecError> = reading::of_data(data);
+        table.and_then(|FromTable(table)| table.spec(overrides, models)).map_err(|error| error.in_file(name))
     }
 
     /// The spec as a TOML file that reads back equal.
@@ -317,8 +318,8 @@ impl DesignOverrides {
     /// # Errors
     /// As [`Spec::from_data`].
     pub fn from_data<'de, D: Deserializer<'de>>(data: D, name: &str) -> Result<Self, SpecError> {
-        let table: Result<Table<Self>, SpecError> = reading::of_data(data);
-        table.map(|Table(keys)| keys).map_err(|error| error.in_file(name))
+        let table: Result<FromTable<Self>, SpecError> = reading::of_data(data);
+        table.map(|FromTable(keys)| keys).map_err(|error| error.in_file(name))
     }
 }
 

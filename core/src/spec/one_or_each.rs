@@ -45,15 +45,15 @@ impl<T> OneOrEach<T> {
 }
 
 /// Reads numbers and texts as one value, and lists as one value each.
-struct Reader<T>(PhantomData<T>);
+struct OneOrEachVisitor<T>(PhantomData<T>);
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for OneOrEach<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(Reader(PhantomData))
+        deserializer.deserialize_any(OneOrEachVisitor(PhantomData))
     }
 }
 
-impl<'de, T: Deserialize<'de>> Visitor<'de> for Reader<T> {
+impl<'de, T: Deserialize<'de>> Visitor<'de> for OneOrEachVisitor<T> {
     type Value = OneOrEach<T>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -7,24 +7,24 @@ use std::marker::PhantomData;
 
 /// What is read from a table.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Table<T>(pub(crate) T);
+pub(crate) struct FromTable<T>(pub(crate) T);
 
-struct Reader<T>(PhantomData<T>);
+struct TableVisitor<T>(PhantomData<T>);
 
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for Table<T> {
+impl<'de, T: Deserialize<'de>> Deserialize<'de> for FromTable<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_map(Reader(PhantomData))
+        deserializer.deserialize_map(TableVisitor(PhantomData))
     }
 }
 
-impl<'de, T: Deserialize<'de>> Visitor<'de> for Reader<T> {
-    type Value = Table<T>;
+impl<'de, T: Deserialize<'de>> Visitor<'de> for TableVisitor<T> {
+    type Value = FromTable<T>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a table of keys and values")
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Table<T>, A::Error> {
-        T::deserialize(MapAccessDeserializer::new(map)).map(Table)
+    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<FromTable<T>, A::Error> {
+        T::deserialize(MapAccessDeserializer::new(map)).map(FromTable)
     }
 }

@@ -5,12 +5,12 @@ use serde::Deserialize;
 
 use super::error::{At, refused};
 use super::filter_table::FilterTable;
-use super::table::Table;
+use super::table::FromTable;
 use super::{
     Band, ChannelSpec, DesignOverrides, FilterModel, FilterModels, Fitting, OneOrEach, Refusal, SignalSpec,
     SignalSpectrum, Spec, SpecError, SpecProblem, USUAL_RMS, UncertaintySpec, frames, limits,
 };
-use crate::quantity::{FullScale, Rate, Share, Time};
+use crate::quantity::{FullScale, Rate, Share, WrittenTime};
 use crate::units::{Decibels, FastPeriods, Hertz, Seconds};
 
 /// Errors of models below this, in decibels, are not carried into the uncertainty: 1.2e-4 of the gain.
@@ -21,35 +21,35 @@ const LEAST_MODEL_ERROR_DB: f64 = 1e-3;
 #[serde(default, deny_unknown_fields)]
 pub(crate) struct SpecTable {
     name: String,
-    fast_period: Option<Time>,
+    fast_period: Option<WrittenTime>,
     fast_rate: Option<Rate>,
     ratio: Option<usize>,
     latency: Option<usize>,
     full_scale: Option<FullScale>,
     fit: Vec<Fitting>,
-    target: Option<Table<TargetTable>>,
-    channel: Option<Vec<Table<ChannelTable>>>,
-    signal: Option<Table<SignalTable>>,
-    uncertainty: Option<Table<UncertaintyTable>>,
-    design: Option<Table<DesignOverrides>>,
+    target: Option<FromTable<TargetTable>>,
+    channel: Option<Vec<FromTable<ChannelTable>>>,
+    signal: Option<FromTable<SignalTable>>,
+    uncertainty: Option<FromTable<UncertaintyTable>>,
+    design: Option<FromTable<DesignOverrides>>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct TargetTable {
-    filter: Option<Table<FilterTable>>,
+    filter: Option<FromTable<FilterTable>>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct ChannelTable {
-    delay: Option<Time>,
+    delay: Option<WrittenTime>,
     delay_samples: Option<f64>,
     rate: Option<Rate>,
-    filter: Option<Table<FilterTable>>,
+    filter: Option<FromTable<FilterTable>>,
     noise: Option<f64>,
     bits: Option<u32>,
-    jitter: Option<Time>,
+    jitter: Option<WrittenTime>,
     gain: Option<f64>,
     offset: Option<f64>,
 }
@@ -58,7 +58,7 @@ pub(super) struct ChannelTable {
 #[serde(default, deny_unknown_fields)]
 pub(super) struct SignalTable {
     band: Option<OneOrEach<Hertz>>,
-    filter: Option<Table<FilterTable>>,
+    filter: Option<FromTable<FilterTable>>,
     floor_db: Option<f64>,
     rms: Option<f64>,
 }
@@ -66,7 +66,7 @@ pub(super) struct SignalTable {
 #[derive(Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct UncertaintyTable {
-    delay: Option<OneOrEach<Time>>,
+    delay: Option<OneOrEach<WrittenTime>>,
     delay_samples: Option<OneOrEach<f64>>,
     gain: Option<OneOrEach<Share>>,
     cutoff: Option<OneOrEach<Share>>,
@@ -126,10 +126,10 @@ impl SpecTable {
 
     fn unchecked(self, overrides: DesignOverrides, models: &FilterModels<'_>) -> Result<Spec, SpecError> {
         self.fast_rate.map_or(Ok(()), |rate| limits::check_rate(rate.0)).at("fast_rate")?;
-        let rate = self.fast_rate.map(|rate| Time::Seconds(rate.0.period()));
+        let rate = self.fast_rate.map(|rate| WrittenTime::Seconds(rate.0.period()));
         let h = match FAST_PERIOD.only(self.fast_period, rate)? {
-            Some(Time::Seconds(h)) => h,
-            Some(Time::Samples(_)) => {
+            Some(WrittenTime::Seconds(h)) => h,
+            Some(WrittenTime::Samples(_)) => {
                 return Err(refused("fast_period", "it must be in seconds, as in 1e-9 or \"1 ns\""));
             }
             None => required(None, "fast_period", "give fast_period in seconds or fast_rate in hertz")?,
@@ -137,24 +137,24 @@ impl SpecTable {
         // Everything else is relative to it.
         limits::check_fast_period(h).at("fast_period")?;
         let remedy = "describe the filter of the ideal fast converter, [target] filter = { .. }";
-        let Table(target) = required(self.target, "target", remedy)?;
+        let FromTable(target) = required(self.target, "target", remedy)?;
         let target = required(target.filter, "filter", "give the target's analog filter")
-            .and_then(|Table(filter)| filter.model(h, models).map_err(|error| error.inside("filter")))
+            .and_then(|FromTable(filter)| filter.model(h, models).map_err(|error| error.inside("filter")))
             .map_err(|error| error.inside("target"))?;
         let design = overrides.over(self.design.unwrap_or_default().0);
         design.noise.map_or(Ok(()), limits::check_noise).at("design.noise")?;
         let common = Common { h, target: &target, noise: design.noise.unwrap_or(0.0), models };
         let remedy = "describe every slow converter in a table of its own, [[channel]] delay = ..";
         let tables = required(self.channel, "channel", remedy)?.into_iter().enumerate();
-        let channel = |(i, Table(table)): (usize, Table<ChannelTable>)| {
+        let channel = |(i, FromTable(table)): (usize, FromTable<ChannelTable>)| {
             table.channel(&common).map_err(|error| error.inside(&format!("channel[{i}]")))
         };
         let channels = tables.map(channel).collect::<Result<Vec<_>, _>>()?;
         let (mut channels, errors): (Vec<_>, Vec<_>) = channels.into_iter().unzip();
         let ratio = frames::common_ratio(h, self.ratio, &mut channels)?;
         let signal =
-            self.signal.map(|Table(table)| table.signal()).transpose().map_err(|e| e.inside("signal"))?;
-        let uncertainty = self.uncertainty.map(|Table(table)| table.uncertainty(h)).transpose();
+            self.signal.map(|FromTable(table)| table.signal()).transpose().map_err(|e| e.inside("signal"))?;
+        let uncertainty = self.uncertainty.map(|FromTable(table)| table.uncertainty(h)).transpose();
         let uncertainty = uncertainty.map_err(|error| error.inside("uncertainty"))?;
         Ok(Spec {
             name: self.name,
@@ -183,10 +183,10 @@ struct Common<'a> {
 impl ChannelTable {
     /// The channel, and the error of its filter's model.
     fn channel(self, common: &Common<'_>) -> Result<(ChannelSpec, Decibels), SpecError> {
-        let samples = self.delay_samples.map(|periods| Time::Samples(FastPeriods(periods)));
+        let samples = self.delay_samples.map(|periods| WrittenTime::Samples(FastPeriods(periods)));
         let remedy = "give delay in seconds or delay_samples in fast periods (0 for none)";
         let delay = required(DELAY.only(self.delay, samples)?, "delay", remedy)?;
-        let model = self.filter.map(|Table(filter)| filter.model(common.h, common.models)).transpose();
+        let model = self.filter.map(|FromTable(filter)| filter.model(common.h, common.models)).transpose();
         let FilterModel { filter, error } =
             model.map_err(|error| error.inside("filter"))?.unwrap_or_else(|| common.target.clone());
         let jitter = self.jitter.map_or(Seconds(0.0), |jitter| jitter.in_seconds(common.h));
@@ -208,8 +208,11 @@ impl ChannelTable {
 impl SignalTable {
     fn signal(self) -> Result<SignalSpec, SpecError> {
         let band = self.band.map(band).transpose().at("band")?.map(SignalSpectrum::Band);
-        let filter =
-            self.filter.map(|Table(filter)| filter.filter()).transpose().map_err(|e| e.inside("filter"))?;
+        let filter = self
+            .filter
+            .map(|FromTable(filter)| filter.filter())
+            .transpose()
+            .map_err(|e| e.inside("filter"))?;
         let remedy = "say which frequencies the signal occupies, as in band = \"8 kHz\" or band = [\"60 MHz\", \"80 MHz\"]";
         let spectrum = SPECTRUM.only(band, filter.map(SignalSpectrum::Filter))?;
         let spectrum = required(spectrum, "band", remedy)?;
@@ -231,7 +234,7 @@ fn band(written: OneOrEach<Hertz>) -> Result<Band, SpecProblem> {
 
 impl UncertaintyTable {
     fn uncertainty(self, h: Seconds) -> Result<UncertaintySpec, SpecError> {
-        let samples = self.delay_samples.map(|list| list.map(|n| Time::Samples(FastPeriods(*n))));
+        let samples = self.delay_samples.map(|list| list.map(|n| WrittenTime::Samples(FastPeriods(*n))));
         let shares = |list: Option<OneOrEach<Share>>| list.map(|list| list.map(|share| share.0));
         Ok(UncertaintySpec {
             delay: DELAY.only(self.delay, samples)?.map(|list| list.map(|time| time.in_seconds(h))),

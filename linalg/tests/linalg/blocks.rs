@@ -1,4 +1,4 @@
-use hybank_linalg::blocks::{Blocks, SmallCholesky};
+use hybank_linalg::blocks::{Batch, SmallCholesky};
 use hybank_linalg::{CMat, Complex};
 
 fn wavy(rows: usize, cols: usize, seed: f64) -> CMat {
@@ -12,10 +12,10 @@ fn wavy(rows: usize, cols: usize, seed: f64) -> CMat {
 fn products_agree_with_nalgebra_for_all_sizes_and_adjoints() {
     for n in 1..20 {
         let (a, b) = (wavy(n, n, 0.1), wavy(n, n, 0.7));
-        let mut store = Blocks::zeros(3, n, n);
+        let mut store = Batch::zeros(3, n, n);
         store.set(0, &a);
         store.set(1, &b);
-        let mut out = Blocks::zeros(1, n, n);
+        let mut out = Batch::zeros(1, n, n);
         let (x, y) = (store.block(0), store.block(1));
         let cases = [
             (x.plain(), y.plain(), &a * &b),
@@ -37,7 +37,7 @@ fn cholesky_tells_definite_from_indefinite() {
         let a = wavy(n, n + 2, 0.3);
         let gram = &a * a.adjoint() + CMat::identity(n, n);
         let mut chol = SmallCholesky::new(n);
-        let mut store = Blocks::zeros(1, n, n);
+        let mut store = Batch::zeros(1, n, n);
         store.set(0, &gram);
         assert!(chol.factor(store.block_mut(0)));
         let mut l = store.to_matrix(0);

@@ -28,7 +28,7 @@ pub(crate) fn render_rectified<'py>(
     maps: Vec<PyReadonlyArray2<'_, f32>>,
     positions: Vec<f64>,
     at: f64,
-    options: Options,
+    options: RenderOptions,
     fill: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let views = views(&images, &maps, positions, Measure::Disparity)?;
@@ -47,7 +47,7 @@ pub(crate) fn render_calibrated<'py>(
     cameras: Vec<PyReadonlyArray2<'_, f64>>,
     camera: PyReadonlyArray2<'_, f64>,
     size: (usize, usize),
-    options: Options,
+    options: RenderOptions,
     fill: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let cameras = cameras.iter().map(metric).collect::<PyResult<Vec<_>>>()?;
@@ -73,7 +73,7 @@ fn rendered<'py, P: Viewpoint + 'static>(
 /// How views are rendered, by the names of the command line.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub(crate) struct Options {
+pub(crate) struct RenderOptions {
     method: String,
     fill: String,
     degree: Option<String>,
@@ -83,7 +83,7 @@ pub(crate) struct Options {
     keep_exposure: bool,
 }
 
-impl Options {
+impl RenderOptions {
     fn settings(&self) -> PyResult<RenderSettings> {
         let Self { offset, nearest, keep_exposure, .. } = *self;
         let methods = [("auto", Method::Auto), ("rows", Method::Rows), ("plane", Method::Plane)];

@@ -1,7 +1,7 @@
 //! Views without cameras: images and tracks.
 
 use super::views::image;
-use super::{Options, made};
+use super::{RenderOptions, made};
 use crate::background;
 use crate::errors::{refused, warn};
 use crate::results::of_report;
@@ -26,7 +26,7 @@ pub(crate) fn render_uncalibrated<'py>(
     points: Option<PyReadonlyArray2<'_, f64>>,
     between: f64,
     size: (usize, usize),
-    options: Options,
+    options: RenderOptions,
     seed: Option<u64>,
     reverse_order: bool,
 ) -> PyResult<Bound<'py, PyAny>> {

@@ -1,6 +1,6 @@
 //! Samples in memory, frame after frame or channel after channel.
 
-use super::{Halves, Input, MOST_ROWS, Output, SplitOutput, convert, interleave_rows};
+use super::{FrameSink, FrameSource, Halves, MOST_ROWS, SplitOutput, convert, interleave_rows};
 use crate::sample::{same, same_mut};
 use crate::{Isa, ProcessError, Sample};
 use std::ops::Range;
@@ -37,7 +37,7 @@ impl<'a, S: Sample> Interleaved<'a, S> {
     }
 }
 
-impl<S: Sample> Input for Interleaved<'_, S> {
+impl<S: Sample> FrameSource for Interleaved<'_, S> {
     fn channels(&self) -> usize {
         self.channels
     }
@@ -68,7 +68,7 @@ impl<S: Sample> Input for Interleaved<'_, S> {
     }
 }
 
-impl<S: Sample> Output for &mut [S] {
+impl<S: Sample> FrameSink for &mut [S] {
     fn capacity(&self) -> usize {
         self.len()
     }
@@ -134,7 +134,7 @@ impl<'a, S: Sample> Planar<'a, S> {
     }
 }
 
-impl<S: Sample> Input for Planar<'_, S> {
+impl<S: Sample> FrameSource for Planar<'_, S> {
     fn channels(&self) -> usize {
         self.channels.len()
     }

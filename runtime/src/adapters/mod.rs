@@ -1,7 +1,7 @@
 //! Samples of a call, wherever and however they lie: to and from interleaved frames of the kernels' number
 //! type.
 //!
-//! A stream takes any [`Input`] and gives to any [`Output`]; those here are [`Interleaved`] and [`Planar`]
+//! A stream takes any [`FrameSource`] and gives to any [`FrameSink`]; those here are [`Interleaved`] and [`Planar`]
 //! samples in memory, recordings as they lie in files ([`PcmFrames`](crate::PcmFrames)), several inputs
 //! [`SideBySide`], [`Zeros`], slices of samples and [`PcmOutput`](crate::PcmOutput). The kernels' blocks are converted one by one, so that no
 //! adapter needs memory of its own.
@@ -21,7 +21,7 @@ use crate::{Isa, Sample};
 use std::ops::Range;
 
 /// The input of a call: frames of N samples, one of each channel. The kernels ask for it block by block.
-pub trait Input: Sync {
+pub trait FrameSource: Sync {
     /// N, samples per frame.
     fn channels(&self) -> usize;
 
@@ -33,7 +33,7 @@ pub trait Input: Sync {
         None
     }
 
-    /// As [`Input::in_memory_f32`].
+    /// As [`FrameSource::in_memory_f32`].
     fn in_memory_f64(&self) -> Option<&[f64]> {
         None
     }
@@ -48,12 +48,12 @@ pub trait Input: Sync {
     /// conversions.
     fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]);
 
-    /// As [`Input::load_f32`].
+    /// As [`FrameSource::load_f32`].
     fn load_f64(&self, isa: Isa, first: usize, samples: &mut [f64]);
 }
 
 /// Where the output of a call goes: samples at the fast rate, M for each frame of the input.
-pub trait Output: Send {
+pub trait FrameSink: Send {
     /// Samples that fit.
     fn capacity(&self) -> usize;
 
@@ -67,7 +67,7 @@ pub trait Output: Send {
         None
     }
 
-    /// As [`Output::slots_f32`].
+    /// As [`FrameSink::slots_f32`].
     fn slots_f64(&mut self, _samples: Range<usize>) -> Option<&mut [f64]> {
         None
     }
@@ -75,12 +75,12 @@ pub trait Output: Send {
     /// Stores samples from sample `first` on. `isa` is the instruction set for conversions.
     fn store_f32(&mut self, isa: Isa, first: usize, samples: &[f32]);
 
-    /// As [`Output::store_f32`].
+    /// As [`FrameSink::store_f32`].
     fn store_f64(&mut self, isa: Isa, first: usize, samples: &[f64]);
 }
 
 /// An output whose beginning and end may be written by two threads.
-pub trait SplitOutput: Output {
+pub trait SplitOutput: FrameSink {
     /// Calls `with` with the room for the first `samples` samples and that for all others.
     fn halves(&mut self, samples: usize, with: Halves<'_>);
 }
@@ -89,12 +89,12 @@ pub trait SplitOutput: Output {
 pub type Halves<'w> = &'w mut dyn FnMut(&mut dyn SplitOutput, &mut dyn SplitOutput);
 
 /// By number type.
-impl dyn Input + '_ {
+impl dyn FrameSource + '_ {
     pub(crate) fn in_memory<T: Sample>(&self) -> Option<&[T]> {
         self.in_memory_f32().and_then(same).or_else(|| self.in_memory_f64().and_then(same))
     }
 
-    /// [`Input::load_f32`] or [`Input::load_f64`].
+    /// [`FrameSource::load_f32`] or [`FrameSource::load_f64`].
     pub fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
         if let Some(samples) = same_mut(samples) {
             return self.load_f32(isa, first, samples);
@@ -106,7 +106,7 @@ impl dyn Input + '_ {
 }
 
 /// By number type.
-impl dyn Output + '_ {
+impl dyn FrameSink + '_ {
     pub(crate) fn slots<T: Sample>(&mut self, samples: Range<usize>) -> Option<&mut [T]> {
         if size_of::<T>() == 4 {
             self.slots_f32(samples).and_then(same_mut)
@@ -115,7 +115,7 @@ impl dyn Output + '_ {
         }
     }
 
-    /// [`Output::store_f32`] or [`Output::store_f64`].
+    /// [`FrameSink::store_f32`] or [`FrameSink::store_f64`].
     pub fn store<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]) {
         if let Some(samples) = same(samples) {
             self.store_f32(isa, first, samples);
@@ -145,7 +145,7 @@ pub struct Zeros {
     pub frames: usize,
 }
 
-impl Input for Zeros {
+impl FrameSource for Zeros {
     fn channels(&self) -> usize {
         self.channels
     }
@@ -201,13 +201,13 @@ const MOST_ROWS: usize = SCRATCH / 8;
 /// The frames of a range of another input, where they lie.
 #[derive(Clone)]
 pub struct Frames<'a> {
-    input: &'a dyn Input,
+    input: &'a dyn FrameSource,
     range: Range<usize>,
 }
 
 impl<'a> Frames<'a> {
     /// Frames `range` of `input`, as far as it has them.
-    pub fn new(input: &'a dyn Input, range: Range<usize>) -> Self {
+    pub fn new(input: &'a dyn FrameSource, range: Range<usize>) -> Self {
         let end = range.end.min(input.frames());
         Self { input, range: range.start.min(end)..end }
     }
@@ -219,7 +219,7 @@ impl<'a> Frames<'a> {
     }
 }
 
-impl Input for Frames<'_> {
+impl FrameSource for Frames<'_> {
     fn channels(&self) -> usize {
         self.input.channels()
     }

@@ -1,6 +1,6 @@
 //! The offsets of the converters, subtracted from the samples on their way to the kernels.
 
-use super::Input;
+use super::FrameSource;
 use crate::{BuildError, Isa, Sample};
 
 /// Samples after which the pattern of offsets repeats, at least: long enough for whole vectors.
@@ -37,11 +37,11 @@ impl Offsets {
 
 /// The frames of an input without the offsets. What is not finite stays so.
 pub(crate) struct WithoutOffsets<'a> {
-    pub(crate) input: &'a dyn Input,
+    pub(crate) input: &'a dyn FrameSource,
     pub(crate) offsets: &'a Offsets,
 }
 
-impl Input for WithoutOffsets<'_> {
+impl FrameSource for WithoutOffsets<'_> {
     fn channels(&self) -> usize {
         self.input.channels()
     }

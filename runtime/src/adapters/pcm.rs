@@ -1,6 +1,6 @@
 //! Recordings as they lie in files and pipes.
 
-use super::{Halves, Input, Output, SCRATCH, SplitOutput, convert};
+use super::{FrameSink, FrameSource, Halves, SCRATCH, SplitOutput, convert};
 use crate::pcm::{for_pcm_format, peak};
 use crate::simd::{decode, encode};
 use crate::{Isa, PcmFormat, PcmFrames, Sample, SampleLayout};
@@ -18,7 +18,7 @@ pub struct PcmOutput<'a> {
     pub clipped: u64,
     /// The largest magnitude of the samples that were encoded.
     encoded_peak: f64,
-    /// The part of complex samples that is stored, see [`Output::select`].
+    /// The part of complex samples that is stored, see [`FrameSink::select`].
     part: Option<usize>,
 }
 
@@ -66,7 +66,7 @@ fn is_native<T: Sample>(layout: SampleLayout) -> bool {
     layout == SampleLayout::packed(format.native())
 }
 
-impl Input for PcmFrames<'_> {
+impl FrameSource for PcmFrames<'_> {
     fn channels(&self) -> usize {
         self.channels
     }
@@ -123,7 +123,7 @@ fn load_each<T: Sample>(frames: &PcmFrames<'_>, first: usize, samples: &mut [T])
     });
 }
 
-impl Output for PcmOutput<'_> {
+impl FrameSink for PcmOutput<'_> {
     fn capacity(&self) -> usize {
         let (layout, before) = self.selected();
         layout.containers(self.bytes.len().saturating_sub(before))

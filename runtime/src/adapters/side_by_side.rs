@@ -1,6 +1,6 @@
 //! Several inputs side by side.
 
-use super::{Input, MOST_ROWS, SCRATCH, interleave_rows};
+use super::{FrameSource, MOST_ROWS, SCRATCH, interleave_rows};
 use crate::{Isa, Sample};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -16,13 +16,13 @@ impl<'a, I: Clone> SideBySide<'a, I> {
     }
 }
 
-impl<I: Input + Clone> Input for SideBySide<'_, I> {
+impl<I: FrameSource + Clone> FrameSource for SideBySide<'_, I> {
     fn channels(&self) -> usize {
-        self.0.iter().map(Input::channels).sum()
+        self.0.iter().map(FrameSource::channels).sum()
     }
 
     fn frames(&self) -> usize {
-        self.0.iter().map(Input::frames).min().unwrap_or(0)
+        self.0.iter().map(FrameSource::frames).min().unwrap_or(0)
     }
 
     fn in_memory_f32(&self) -> Option<&[f32]> {
@@ -58,8 +58,8 @@ impl<I: Input + Clone> Input for SideBySide<'_, I> {
 }
 
 /// One input after the other, each to its columns of the frames.
-fn load_each<T: Sample>(inputs: &[impl Input], isa: Isa, first: usize, samples: &mut [T]) {
-    let n: usize = inputs.iter().map(Input::channels).sum();
+fn load_each<T: Sample>(inputs: &[impl FrameSource], isa: Isa, first: usize, samples: &mut [T]) {
+    let n: usize = inputs.iter().map(FrameSource::channels).sum();
     let frames = samples.len() / n.max(1);
     let (mut scratch, mut wide) = ([T::default(); SCRATCH], Vec::new());
     let mut column = 0;
@@ -73,7 +73,7 @@ fn load_each<T: Sample>(inputs: &[impl Input], isa: Isa, first: usize, samples: 
         let step = (room.len() / channels.max(1)).max(1);
         for start in (0..frames).step_by(step) {
             let loaded = &mut room[..step.min(frames - start) * channels];
-            (input as &dyn Input).load(isa, first + start, loaded);
+            (input as &dyn FrameSource).load(isa, first + start, loaded);
             let slots = samples[start * n..].chunks_exact_mut(n);
             for (frame, loaded) in slots.zip(loaded.chunks_exact(channels.max(1))) {
                 frame[column..column + channels].copy_from_slice(loaded);

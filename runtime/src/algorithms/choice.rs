@@ -4,7 +4,7 @@
 //! the algorithms round differently, and a bank gives the same bits everywhere.
 
 use super::filter::phase_taps;
-use super::overlap_save::Shape;
+use super::overlap_save::TransformShape;
 use crate::simd::group_lanes;
 use crate::{BuildError, PcmFormat};
 use std::fmt;
@@ -85,7 +85,7 @@ impl Precision {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ChosenAlgorithm {
     Direct,
-    OverlapSave(Shape),
+    OverlapSave(TransformShape),
 }
 
 /// Transforms pay from so many lags K on, times N M / (N + M): sums take K N M multiply-adds per frame,
@@ -125,7 +125,7 @@ impl Algorithm {
         if self == Self::Direct || (self == Self::Auto && sums < transforms) {
             return Ok(ChosenAlgorithm::Direct);
         }
-        match Shape::new(channels, ratio, lags, precision.lanes()) {
+        match TransformShape::new(channels, ratio, lags, precision.lanes()) {
             Some(shape) => Ok(ChosenAlgorithm::OverlapSave(shape)),
             None if self == Self::Auto => Ok(ChosenAlgorithm::Direct),
             None => Err(BuildError::Spectra { channels, ratio, lags }),

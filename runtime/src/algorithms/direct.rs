@@ -10,12 +10,12 @@
 #[cfg(test)]
 mod tests;
 
-use super::filter::{Facts, Filter, check_finite, phase_taps};
-use crate::adapters::{Input, Output};
+use super::filter::{AlgorithmFacts, Filter, check_finite, phase_taps};
+use crate::adapters::{FrameSink, FrameSource};
 use crate::aligned::Aligned;
 use crate::history::History;
 use crate::simd::{FirKernel, Polyphase, Replaced, Segment, Tiling, not_finite, replace_not_finite};
-use crate::state::{Count, Numbers};
+use crate::state::{Count, StateNumbers};
 use crate::{BuildError, Isa, Sample};
 use std::ops::Range;
 
@@ -160,9 +160,9 @@ impl<T: Sample> Direct<T> {
     fn process_block(
         &self,
         state: &mut DirectState<T>,
-        input: &dyn Input,
+        input: &dyn FrameSource,
         frames: Range<usize>,
-        output: &mut dyn Output,
+        output: &mut dyn FrameSink,
     ) -> u64 {
         let DirectState { history, output: block } = state;
         let (len, samples) = (frames.len(), frames.start * self.ratio..frames.end * self.ratio);
@@ -220,7 +220,7 @@ impl<T: Sample> Direct<T> {
     /// A state before frame `first` of `input`, as if all frames before it had been processed: at least
     /// [`Direct::history_frames`] of them.
     #[cfg(feature = "rayon")]
-    pub(crate) fn state_at(&self, input: &dyn Input, first: usize) -> DirectState<T> {
+    pub(crate) fn state_at(&self, input: &dyn FrameSource, first: usize) -> DirectState<T> {
         let mut samples = vec![T::default(); self.history_frames * self.channels];
         input.load(self.isa, first - self.history_frames, &mut samples);
         // They are counted where they are processed.
@@ -234,8 +234,8 @@ impl<T: Sample> Direct<T> {
 impl<T: Sample> Filter for Direct<T> {
     type State = DirectState<T>;
 
-    fn facts(&self) -> Facts {
-        Facts {
+    fn facts(&self) -> AlgorithmFacts {
+        AlgorithmFacts {
             name: "direct",
             history: Some(self.history),
             delay: 0,
@@ -257,7 +257,12 @@ impl<T: Sample> Filter for Direct<T> {
         state.history.reset();
     }
 
-    fn process(&self, state: &mut DirectState<T>, input: &dyn Input, output: &mut dyn Output) -> u64 {
+    fn process(
+        &self,
+        state: &mut DirectState<T>,
+        input: &dyn FrameSource,
+        output: &mut dyn FrameSink,
+    ) -> u64 {
         let frames = input.frames();
         if let (Some(head), Some(samples)) = (self.head(frames), input.in_memory())
             && let Some(out) = output.slots(0..frames * self.ratio)
@@ -281,7 +286,7 @@ impl<T: Sample> Filter for Direct<T> {
         state.history.save(self.history, put);
     }
 
-    fn resume(&self, state: &mut DirectState<T>, _place: usize, numbers: Numbers<'_>) {
+    fn resume(&self, state: &mut DirectState<T>, _place: usize, numbers: StateNumbers<'_>) {
         state.history.resume(self.history, numbers);
     }
 }

@@ -1,7 +1,7 @@
 //! What all algorithms have in common.
 
-use crate::adapters::{Input, Output};
-use crate::state::{Count, Numbers};
+use crate::adapters::{FrameSink, FrameSource};
+use crate::state::{Count, StateNumbers};
 use crate::{BuildError, Sample};
 use std::fmt::Debug;
 
@@ -11,7 +11,7 @@ pub(crate) trait Filter: Debug + Send + Sync {
     type State: Clone + Debug + Send + Sync;
 
     /// Facts for users.
-    fn facts(&self) -> Facts;
+    fn facts(&self) -> AlgorithmFacts;
 
     /// The state before the first frame.
     fn state(&self) -> Self::State;
@@ -21,7 +21,7 @@ pub(crate) trait Filter: Debug + Send + Sync {
 
     /// Filters all frames of the input; returns how many samples were not finite and were taken as 0. Does
     /// not allocate.
-    fn process(&self, state: &mut Self::State, input: &dyn Input, output: &mut dyn Output) -> u64;
+    fn process(&self, state: &mut Self::State, input: &dyn FrameSource, output: &mut dyn FrameSink) -> u64;
 
     /// How many numbers make up a state `place` frames after a multiple of the alignment.
     fn count(&self, place: usize) -> Count;
@@ -31,12 +31,12 @@ pub(crate) trait Filter: Debug + Send + Sync {
 
     /// Makes the state that [`Filter::save`] gave as `numbers`, as many as [`Filter::count`] says. Does not
     /// allocate.
-    fn resume(&self, state: &mut Self::State, place: usize, numbers: Numbers<'_>);
+    fn resume(&self, state: &mut Self::State, place: usize, numbers: StateNumbers<'_>);
 }
 
 /// What an algorithm says of itself.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Facts {
+pub(crate) struct AlgorithmFacts {
     pub(crate) name: &'static str,
     /// Frames after which an input is forgotten; `None` if it never is.
     pub(crate) history: Option<usize>,

@@ -10,6 +10,6 @@ pub(crate) mod overlap_save;
 pub(crate) mod recursive;
 
 pub(crate) use direct::Direct;
-pub(crate) use filter::{Facts, Filter};
+pub(crate) use filter::{AlgorithmFacts, Filter};
 pub(crate) use overlap_save::OverlapSave;
 pub(crate) use recursive::Recursive;

@@ -7,15 +7,15 @@
 use super::avx2::{Avx2F32, Avx2F64};
 #[cfg(target_arch = "x86_64")]
 use super::avx512::{Avx512F32, Avx512F64};
-use super::isa::{Isa, Kind};
+use super::isa::{Isa, IsaKind};
 use super::lanes::Lanes;
 #[cfg(target_arch = "aarch64")]
 use super::neon::{NeonF32, NeonF64};
 use super::portable::Portable;
-use super::vector::{Number, Vector};
+use super::vector::{Vector, VectorNumber};
 
 /// A sample type with its vector in each instruction set.
-pub(crate) trait Element: Number {
+pub(crate) trait SimdElement: VectorNumber {
     /// One group as an array.
     type Portable: Vector<Sample = Self> + Lanes<Self>;
     /// One group.
@@ -31,7 +31,7 @@ pub(crate) trait Element: Number {
 
 macro_rules! element {
     ($sample:ty, $lanes:literal, $avx2:ty, $avx512:ty, $neon:ty) => {
-        impl Element for $sample {
+        impl SimdElement for $sample {
             type Portable = Portable<$sample, $lanes>;
             #[cfg(target_arch = "x86_64")]
             type Avx2 = $avx2;
@@ -49,7 +49,7 @@ element!(f64, 4, Avx2F64, Avx512F64, NeonF64);
 /// A computation that is written once for all instruction sets.
 pub(crate) trait Kernel {
     /// The sample type, which decides on the vector of each instruction set.
-    type Sample: Element;
+    type Sample: SimdElement;
     /// The arguments.
     type Job<'a>;
     /// The result.
@@ -77,10 +77,10 @@ macro_rules! instruction_sets {
         /// The function of kernel `K` for an instruction set.
         pub(crate) fn compiled<K: Kernel>(isa: Isa) -> Compiled<K> {
             match isa.kind() {
-                Kind::Portable => portable::<K>,
+                IsaKind::Portable => portable::<K>,
                 $(
                     #[cfg(target_arch = $arch)]
-                    Kind::$kind => $function::<K>,
+                    IsaKind::$kind => $function::<K>,
                 )*
             }
         }
@@ -89,21 +89,21 @@ macro_rules! instruction_sets {
         /// compiled for such vectors only.
         pub(crate) fn compiled_narrow<K: Kernel>(isa: Isa) -> Compiled<K> {
             match isa.kind() {
-                Kind::Portable => portable::<K>,
+                IsaKind::Portable => portable::<K>,
                 $(
                     #[cfg(target_arch = $arch)]
-                    Kind::$kind => $narrow::<K>,
+                    IsaKind::$kind => $narrow::<K>,
                 )*
             }
         }
 
         /// Lanes of a vector of an instruction set.
-        pub(crate) fn vector_lanes<T: Element>(isa: Isa) -> usize {
+        pub(crate) fn vector_lanes<T: SimdElement>(isa: Isa) -> usize {
             match isa.kind() {
-                Kind::Portable => T::Portable::LANES,
+                IsaKind::Portable => T::Portable::LANES,
                 $(
                     #[cfg(target_arch = $arch)]
-                    Kind::$kind => T::$kind::LANES,
+                    IsaKind::$kind => T::$kind::LANES,
                 )*
             }
         }
@@ -113,7 +113,7 @@ macro_rules! instruction_sets {
             #[target_feature(enable = $features)]
             unsafe fn $function<K: Kernel>(job: K::Job<'_>) -> K::Output {
                 // This function is compiled for the set, and is returned only for an `Isa` that includes it.
-                K::run::<<K::Sample as Element>::$kind>(job)
+                K::run::<<K::Sample as SimdElement>::$kind>(job)
             }
         )*
     };
@@ -127,7 +127,7 @@ instruction_sets! {
 
 unsafe fn portable<K: Kernel>(job: K::Job<'_>) -> K::Output {
     // Every processor has these instructions.
-    K::run::<<K::Sample as Element>::Portable>(job)
+    K::run::<<K::Sample as SimdElement>::Portable>(job)
 }
 
 /// Keeps the compiler from computing both sides of a branch and choosing afterwards, where that costs more

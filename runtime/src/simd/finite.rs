@@ -1,6 +1,6 @@
 //! Whether samples are numbers, and zeros in place of those that are not.
 
-use super::dispatch::{Element, Kernel, compiled};
+use super::dispatch::{Kernel, SimdElement, compiled};
 use super::isa::Isa;
 use super::vector::{MOST_LANES, Vector};
 use std::marker::PhantomData;
@@ -16,14 +16,14 @@ pub(crate) struct Replaced {
 }
 
 /// Zeros in place of NaN and infinity.
-pub(crate) fn replace_not_finite<T: Element>(isa: Isa, samples: &mut [T]) -> Replaced {
+pub(crate) fn replace_not_finite<T: SimdElement>(isa: Isa, samples: &mut [T]) -> Replaced {
     // SAFETY: the kernel asks nothing of its job.
     unsafe { compiled::<ReplaceNotFinite<T>>(isa)(samples) }
 }
 
 struct ReplaceNotFinite<T>(PhantomData<T>);
 
-impl<T: Element> Kernel for ReplaceNotFinite<T> {
+impl<T: SimdElement> Kernel for ReplaceNotFinite<T> {
     type Sample = T;
     type Job<'a> = &'a mut [T];
     type Output = Replaced;
@@ -54,7 +54,7 @@ impl<T: Element> Kernel for ReplaceNotFinite<T> {
 }
 
 /// From the first sample that is not finite to the last one; none if all are.
-pub(crate) fn not_finite<T: Element>(samples: &[T]) -> Range<usize> {
+pub(crate) fn not_finite<T: SimdElement>(samples: &[T]) -> Range<usize> {
     let is_lost = |sample: &T| !sample.is_finite();
     let first = samples.iter().position(is_lost).unwrap_or(samples.len());
     first..samples[first..].iter().rposition(is_lost).map_or(first, |last| first + last + 1)

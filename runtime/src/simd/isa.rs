@@ -19,11 +19,11 @@ use std::fmt;
 /// let options = Options { isa: Isa::Avx2, ..Options::default() };
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Isa(Kind);
+pub struct Isa(IsaKind);
 
 /// What kernels are compiled for. Each kind that needs asking the processor exists only inside an [`Isa`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) enum Kind {
+pub(super) enum IsaKind {
     /// What every processor of the architecture has.
     Portable,
     /// x86-64 with AVX2, FMA and POPCNT: 256-bit vectors.
@@ -37,7 +37,7 @@ pub(super) enum Kind {
     Neon,
 }
 
-impl Kind {
+impl IsaKind {
     /// All kinds, the widest one last.
     const ALL: &'static [Self] = &[
         Self::Portable,
@@ -80,28 +80,28 @@ impl Isa {
 
     /// All instruction sets of this processor, the portable one first, the widest one last.
     pub fn available() -> impl Iterator<Item = Self> {
-        Kind::ALL.iter().filter(|kind| kind.is_available()).map(|&kind| Self(kind))
+        IsaKind::ALL.iter().filter(|kind| kind.is_available()).map(|&kind| Self(kind))
     }
 
     /// The instructions that every processor of the architecture has.
     pub const fn portable() -> Self {
-        Self(Kind::Portable)
+        Self(IsaKind::Portable)
     }
 
     /// `portable`, `avx2`, `avx512` or `neon`.
     pub const fn name(self) -> &'static str {
         match self.0 {
-            Kind::Portable => "portable",
+            IsaKind::Portable => "portable",
             #[cfg(target_arch = "x86_64")]
-            Kind::Avx2 => "avx2",
+            IsaKind::Avx2 => "avx2",
             #[cfg(target_arch = "x86_64")]
-            Kind::Avx512 => "avx512",
+            IsaKind::Avx512 => "avx512",
             #[cfg(target_arch = "aarch64")]
-            Kind::Neon => "neon",
+            IsaKind::Neon => "neon",
         }
     }
 
-    pub(super) fn kind(self) -> Kind {
+    pub(super) fn kind(self) -> IsaKind {
         self.0
     }
 }

@@ -4,9 +4,9 @@
 //! group, each lane for itself: frames of several channels are transformed as they lie, and every lane has
 //! the bits that it would have alone. Nothing is fused, so these are the same on every processor.
 
-use super::dispatch::Element;
+use super::dispatch::SimdElement;
 use super::portable::Portable;
-use super::vector::Number;
+use super::vector::VectorNumber;
 use crate::Sample;
 use rustfft::FftNum;
 use rustfft::num_complex::Complex;
@@ -15,7 +15,7 @@ use std::array;
 use std::ops::{Add, Div, Mul, Neg, Rem, Sub};
 
 /// One frequency, or one frame of each block, of several channels or phases.
-pub(crate) type Row<T> = Complex<<T as Element>::Portable>;
+pub(crate) type Row<T> = Complex<<T as SimdElement>::Portable>;
 
 /// A lane group that is a number of rustfft.
 pub(crate) trait Lanes<T>: FftNum {
@@ -44,7 +44,7 @@ impl<T: Sample, const L: usize> Lanes<T> for Portable<T, L> {
 
 macro_rules! operator {
     ($operator:ident, $function:ident) => {
-        impl<T: Number, const L: usize> $operator for Portable<T, L> {
+        impl<T: VectorNumber, const L: usize> $operator for Portable<T, L> {
             type Output = Self;
 
             #[inline(always)]
@@ -61,7 +61,7 @@ operator!(Mul, mul);
 operator!(Div, div);
 operator!(Rem, rem);
 
-impl<T: Number, const L: usize> Neg for Portable<T, L> {
+impl<T: VectorNumber, const L: usize> Neg for Portable<T, L> {
     type Output = Self;
 
     #[inline(always)]

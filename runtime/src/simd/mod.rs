@@ -55,7 +55,7 @@ mod vector;
 #[cfg(test)]
 pub(crate) mod work;
 
-pub(crate) use dispatch::Element;
+pub(crate) use dispatch::SimdElement;
 pub(crate) use finite::{Replaced, not_finite, replace_not_finite};
 pub(crate) use fir::{FirKernel, Polyphase, Segment, Tiling};
 pub(crate) use flush::flushing;
@@ -63,6 +63,6 @@ pub use isa::Isa;
 pub(crate) use lanes::{Lanes, Row};
 pub(crate) use pcm::{decode, encode, interleave};
 pub use peak::multiply_add_chains;
-pub(crate) use recursion::{ColumnTile, Form, Recursion, RecursionKernel, SectionVector};
+pub(crate) use recursion::{ColumnTile, Recursion, RecursionForm, RecursionKernel, SectionVector};
 pub(crate) use spectra::{Product, multiply};
 pub(crate) use vector::group_lanes;

@@ -43,7 +43,7 @@ pub(crate) fn interleave(
     assert!(m == 0 || (m - 1) * stride + frames.next_multiple_of(GROUP) <= rows.len());
     let rows = rows.as_ptr();
     // SAFETY: the bounds are asserted above.
-    unsafe { compiled_narrow::<Interleave>(isa)(Rows { rows, stride, m, frames, out: out.as_mut_ptr() }) }
+    unsafe { compiled_narrow::<Interleave>(isa)(PcmRows { rows, stride, m, frames, out: out.as_mut_ptr() }) }
 }
 
 /// Decodes whole vectors with `$load`, of a format of so many bytes; the samples done.
@@ -117,7 +117,7 @@ fn encode_each(format: PcmFormat, samples: &[f32], out: &mut [u8]) -> u64 {
 }
 
 /// Rows, `stride` samples apart, and the frames that they become.
-struct Rows {
+struct PcmRows {
     rows: *const f32,
     stride: usize,
     m: usize,
@@ -130,11 +130,11 @@ struct Interleave;
 
 impl Kernel for Interleave {
     type Sample = f32;
-    type Job<'a> = Rows;
+    type Job<'a> = PcmRows;
     type Output = usize;
 
     #[inline(always)]
-    unsafe fn run<V: Vector<Sample = f32>>(Rows { rows, stride, m, frames, out }: Rows) -> usize {
+    unsafe fn run<V: Vector<Sample = f32>>(PcmRows { rows, stride, m, frames, out }: PcmRows) -> usize {
         // Of three samples per frame the place after them is written too.
         let whole = frames.saturating_sub(usize::from(m == 3)) / GROUP * GROUP;
         for first in (0..whole).step_by(GROUP) {

@@ -1,6 +1,6 @@
 //! One lane group as an array, which the compiler turns into whatever vectors the architecture has.
 
-use super::vector::{Number, Vector};
+use super::vector::{Vector, VectorNumber};
 
 /// L lanes of T, 32 bytes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -9,7 +9,7 @@ pub(crate) struct Portable<T, const L: usize>(pub(super) [T; L]);
 
 impl<T, const L: usize> Vector for Portable<T, L>
 where
-    T: Number,
+    T: VectorNumber,
 {
     type Sample = T;
     const LANES: usize = L;

@@ -22,12 +22,12 @@ const STEP: usize = 4;
 pub(crate) struct Recursion {
     /// S, states after padding to whole vectors.
     pub(crate) states: usize,
-    pub(crate) form: Form,
+    pub(crate) form: RecursionForm,
 }
 
 /// How the states depend on one another.
 #[derive(Debug)]
-pub(crate) enum Form {
+pub(crate) enum RecursionForm {
     /// By twos: states 2 v L + l and 2 v L + L + l, L lanes per vector, belong to section v L + l.
     Sections(Vec<SectionVector>),
     /// In any way.
@@ -62,7 +62,7 @@ impl ColumnTile {
 }
 
 /// One call of the kernel, checked.
-pub(crate) struct Job<'a> {
+pub(crate) struct RecursionJob<'a> {
     recursion: &'a Recursion,
     rows: *mut f64,
     window: *const f64,
@@ -109,11 +109,11 @@ impl RecursionKernel {
         let (rows, window) = (rows.as_mut_ptr(), window.as_ptr());
         // SAFETY: rows 0 to `frames` and the inputs of all frames are in the slices, and the places, columns
         // and coefficients of the form fit them, as asserted.
-        unsafe { (self.run)(&Job { recursion, rows, window, hop, frames }) }
+        unsafe { (self.run)(&RecursionJob { recursion, rows, window, hop, frames }) }
     }
 }
 
-impl Form {
+impl RecursionForm {
     /// Coefficients, one multiply-add per frame each.
     #[cfg(test)]
     fn coefficients(&self) -> usize {
@@ -150,13 +150,13 @@ pub(crate) struct Body;
 
 impl Kernel for Body {
     type Sample = f64;
-    type Job<'a> = &'a Job<'a>;
+    type Job<'a> = &'a RecursionJob<'a>;
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<V: Vector<Sample = f64>>(job: &Job<'_>) {
+    unsafe fn run<V: Vector<Sample = f64>>(job: &RecursionJob<'_>) {
         match &job.recursion.form {
-            Form::Sections(vectors) => {
+            RecursionForm::Sections(vectors) => {
                 let whole = job.frames / STEP * STEP;
                 for t in (0..whole).step_by(STEP) {
                     sections::<V, STEP>(job, vectors, t);
@@ -165,7 +165,7 @@ impl Kernel for Body {
                     sections::<V, 1>(job, vectors, t);
                 }
             }
-            Form::Dense(tiles) => {
+            RecursionForm::Dense(tiles) => {
                 for t in 0..job.frames {
                     dense::<V>(job, tiles, t);
                 }
@@ -178,7 +178,7 @@ impl Kernel for Body {
 /// next can begin.
 #[inline(always)]
 unsafe fn sections<V: Vector<Sample = f64>, const T: usize>(
-    job: &Job<'_>,
+    job: &RecursionJob<'_>,
     vectors: &[SectionVector],
     t: usize,
 ) {
@@ -227,7 +227,7 @@ unsafe fn section_vector<V: Vector<Sample = f64>, const T: usize>(
 
 /// Frame t, for any A.
 #[inline(always)]
-unsafe fn dense<V: Vector<Sample = f64>>(job: &Job<'_>, tiles: &[ColumnTile], t: usize) {
+unsafe fn dense<V: Vector<Sample = f64>>(job: &RecursionJob<'_>, tiles: &[ColumnTile], t: usize) {
     for tile in tiles {
         match tile.vectors {
             1 => column_tile::<V, 1>(job, tile, t),
@@ -239,7 +239,11 @@ unsafe fn dense<V: Vector<Sample = f64>>(job: &Job<'_>, tiles: &[ColumnTile], t:
 }
 
 #[inline(always)]
-unsafe fn column_tile<V: Vector<Sample = f64>, const R: usize>(job: &Job<'_>, tile: &ColumnTile, t: usize) {
+unsafe fn column_tile<V: Vector<Sample = f64>, const R: usize>(
+    job: &RecursionJob<'_>,
+    tile: &ColumnTile,
+    t: usize,
+) {
     let states = job.recursion.states;
     let mut sums = [V::splat(0.0); R];
     let (x, window) = (job.rows.add(t * states), job.window.add(t * job.hop));

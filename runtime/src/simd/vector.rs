@@ -14,7 +14,7 @@ use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Rem, Sub};
 
 /// A sample type: f32 or f64.
-pub(crate) trait Number:
+pub(crate) trait VectorNumber:
     bytemuck::Pod
     + Default
     + Debug
@@ -43,7 +43,7 @@ pub(super) const FUSED: bool = cfg!(any(target_arch = "aarch64", target_feature 
 
 macro_rules! number {
     ($sample:ty) => {
-        impl Number for $sample {
+        impl VectorNumber for $sample {
             #[inline(always)]
             fn mul_add(self, factor: Self, sum: Self) -> Self {
                 if FUSED { <$sample>::mul_add(self, factor, sum) } else { self * factor + sum }
@@ -82,7 +82,7 @@ pub(super) const MOST_LANES: usize = 16;
 /// one to write for as many as it stores; neither needs an alignment.
 pub(crate) trait Vector: Copy {
     /// The type of a lane.
-    type Sample: Number;
+    type Sample: VectorNumber;
     /// Lanes of the vector.
     const LANES: usize;
     /// Lanes of a group.

@@ -4,7 +4,7 @@
 use super::support::{FIR_ALGORITHMS, Noise, fir_bank, precise, random_taps, recursive_bank};
 use crate::{
     Algorithm, BuildError, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision, SampleLayout,
-    SideBySide, StateSpace, Stream,
+    SideBySide, StateMatrices, Stream,
 };
 
 /// Frames of a test: more than two batches of overlap-save with transforms of 64 frames.
@@ -29,7 +29,7 @@ fn delivered(samples: &[f32], offsets: &[f64]) -> Vec<f32> {
 fn plans(channels: usize, ratio: usize, noise: &mut Noise) -> Vec<[Plan; 2]> {
     let fir = fir_bank(random_taps(channels, 9 * ratio, noise), ratio);
     let order = 3;
-    let recursion = recursive_bank(StateSpace {
+    let recursion = recursive_bank(StateMatrices {
         a: (0..order).map(|i| (0..order).map(|j| 0.25 / (1 + i + j) as f64).collect()).collect(),
         b: random_taps(order, channels, noise),
         c: random_taps(ratio, order, noise),

@@ -1,7 +1,7 @@
 //! Samples as they lie in files give what the same samples in memory give.
 
 use super::support::{Bank, FIR_ALGORITHMS, Noise, by, fir_bank, random_taps, start};
-use crate::{Input, Options, PcmFormat, PcmFrames, PcmOutput, SampleLayout, SideBySide};
+use crate::{FrameSource, Options, PcmFormat, PcmFrames, PcmOutput, SampleLayout, SideBySide};
 use proptest::prelude::*;
 
 /// Random samples of a format.
@@ -40,7 +40,7 @@ fn check_bytes(bank: &Bank, options: Options, [from, to]: [PcmFormat; 2], bytes:
     let columns = columns(bytes, n, from.bytes());
     let planar: Vec<_> = columns.iter().map(|bytes| PcmFrames { layout, channels: 1, bytes }).collect();
     let one = PcmFrames { layout, channels: n, bytes };
-    for recordings in [&one as &dyn Input, &SideBySide::new(&planar[..])] {
+    for recordings in [&one as &dyn FrameSource, &SideBySide::new(&planar[..])] {
         stream.reset();
         let mut out = vec![0; want.0.len()];
         let mut output = PcmOutput::packed(to, &mut out);

@@ -1,6 +1,6 @@
 //! Banks, inputs and the definition of the sum.
 
-use crate::{Algorithm, BuildError, Isa, Options, Plan, Precision, Sample, Shape, StateSpace, Stream};
+use crate::{Algorithm, BuildError, Isa, Options, Plan, Precision, Sample, Shape, StateMatrices, Stream};
 
 /// A generator whose stream never changes (Knuth's MMIX).
 pub(crate) struct Noise(pub(crate) u64);
@@ -20,7 +20,7 @@ impl Noise {
 #[derive(Clone)]
 pub(crate) enum Filters {
     Fir(Vec<Vec<f64>>),
-    StateSpace(StateSpace),
+    StateSpace(StateMatrices),
 }
 
 #[derive(Clone)]
@@ -59,7 +59,7 @@ pub(crate) fn fir_bank(taps: Vec<Vec<f64>>, ratio: usize) -> Bank {
     Bank { filters: Filters::Fir(taps), ratio, latency: 3 }
 }
 
-pub(crate) fn recursive_bank(filter: StateSpace) -> Bank {
+pub(crate) fn recursive_bank(filter: StateMatrices) -> Bank {
     Bank { ratio: filter.d.len(), filters: Filters::StateSpace(filter), latency: 3 }
 }
 
@@ -70,7 +70,7 @@ pub(crate) fn random_taps(channels: usize, taps: usize, noise: &mut Noise) -> Ve
 /// Two states that turn by one radian and shrink a little; c picks them, d passes input on.
 pub(crate) fn rotation_bank() -> Bank {
     let (s, c) = 1f64.sin_cos();
-    let filter = StateSpace {
+    let filter = StateMatrices {
         a: vec![vec![0.9 * c, -0.9 * s], vec![0.9 * s, 0.9 * c]],
         b: vec![vec![1.0], vec![0.0]],
         c: vec![vec![1.0, 0.0], vec![0.0, 1.0], vec![1.0, 1.0]],
@@ -130,7 +130,7 @@ pub(crate) fn definition<S: Sample>(taps: &[Vec<f64>], ratio: usize, input: &[S]
 }
 
 /// The definition of a recursion, row by row.
-pub(crate) fn state_space_definition(filter: &StateSpace, input: &[f64]) -> Vec<f64> {
+pub(crate) fn state_space_definition(filter: &StateMatrices, input: &[f64]) -> Vec<f64> {
     let dot = |row: &[f64], v: &[f64]| row.iter().zip(v).map(|(a, b)| a * b).sum::<f64>();
     let mut x = vec![0.0; filter.a.len()];
     let mut out = Vec::new();

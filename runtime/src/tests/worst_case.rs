@@ -7,7 +7,7 @@ use super::support::{
 };
 use crate::algorithms::recursive::{BLOCK, NEGLIGIBLE_STATE};
 use crate::simd::{group_lanes, work};
-use crate::{Algorithm, Options, Precision, Sample, StateSpace, Stream};
+use crate::{Algorithm, Options, Precision, Sample, StateMatrices, Stream};
 
 const FRAMES: usize = 1280;
 /// Frames per call.
@@ -174,7 +174,7 @@ fn the_direct_algorithm_filters_few_frames_again_for_one_that_is_not_finite() {
 
 #[test]
 fn recursions_filter_a_frame_once() {
-    let dense = StateSpace {
+    let dense = StateMatrices {
         a: (0..5).map(|i| (0..5).map(|j| 0.1 / (1 + i + j) as f64).collect()).collect(),
         b: vec![vec![1.0, -1.0]; 5],
         c: vec![vec![1.0; 5]; 3],
@@ -222,7 +222,7 @@ fn denormals_count_as_zero_and_the_least_normal_numbers_stay() {
 /// The state of x[k + 1] = pole x[k] + u[k] after an impulse.
 fn fading(pole: f64, frames: usize) -> Vec<f64> {
     let filter =
-        StateSpace { a: vec![vec![pole]], b: vec![vec![1.0]], c: vec![vec![1.0]], d: vec![vec![0.0]] };
+        StateMatrices { a: vec![vec![pole]], b: vec![vec![1.0]], c: vec![vec![1.0]], d: vec![vec![0.0]] };
     let mut input = vec![0.0; frames];
     input[0] = 1.0;
     run(&recursive_bank(filter), Options::default(), &input)

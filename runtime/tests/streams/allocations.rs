@@ -2,8 +2,8 @@
 //! of the samples.
 
 use hybank_runtime::{
-    Algorithm, Input, Interleaved, Options, Output, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision,
-    SampleLayout, Shape, SideBySide, StateSpace, Stream, Zeros,
+    Algorithm, FrameSink, FrameSource, Interleaved, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Planar,
+    Precision, SampleLayout, Shape, SideBySide, StateMatrices, Stream, Zeros,
 };
 
 const N: usize = 2;
@@ -32,7 +32,7 @@ fn plans_of(channels: usize, precision: Precision) -> Vec<Plan> {
     let by = |algorithm| Plan::from_taps(&taps, M, 4, options(algorithm)).unwrap();
     // Two states side by side, which run as a section, and five that all depend on one another.
     let recursive = |order: usize| {
-        let system = StateSpace {
+        let system = StateMatrices {
             a: (0..order).map(|i| (0..order).map(|j| 0.25 / (1 + i + j) as f64).collect()).collect(),
             b: vec![vec![1.0; channels]; order],
             c: vec![vec![1.0; order]; M],
@@ -52,7 +52,7 @@ fn quiet<R>(plan: &Plan, form: &str, call: impl FnOnce() -> R) -> R {
 }
 
 /// An input and an output through [`Stream::run`].
-fn quiet_run(stream: &mut Stream, form: &str, input: &dyn Input, output: &mut dyn Output) {
+fn quiet_run(stream: &mut Stream, form: &str, input: &dyn FrameSource, output: &mut dyn FrameSink) {
     let plan = stream.plan().clone();
     let wanted = input.frames() * M;
     assert_eq!(quiet(&plan, form, || stream.run(input, output)), Ok(wanted), "{form}");

@@ -1,7 +1,7 @@
 //! Packed floats of this machine's byte order are read and written where they lie; all others are converted.
 
 use hybank_runtime::{
-    Input, Isa, Output, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, SideBySide,
+    FrameSink, FrameSource, Isa, PcmFormat, PcmFrames, PcmOutput, Precision, SampleLayout, SideBySide,
 };
 
 const NATIVE: PcmFormat = PcmFormat::F32Le.native();

@@ -3,7 +3,7 @@
 
 use hybank_runtime::{
     Algorithm, Isa, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Precision, SampleLayout, Shape,
-    StateSpace, Stream,
+    StateMatrices, Stream,
 };
 
 /// y[k M + p] = sum_i sum_j f_i[p + j M] x_i[k - j].
@@ -84,7 +84,7 @@ fn recursions_follow_the_definition() {
         let matrix =
             |rows: usize, cols: usize| samples(rows * cols).chunks(cols).map(<[f64]>::to_vec).collect();
         let filter =
-            StateSpace { a: (0..3).map(row).collect(), b: matrix(3, 2), c: matrix(2, 3), d: matrix(2, 2) };
+            StateMatrices { a: (0..3).map(row).collect(), b: matrix(3, 2), c: matrix(2, 3), d: matrix(2, 2) };
         let input = samples(2 * 70);
         let mut want = Vec::new();
         let mut x = [0.0; 3];

@@ -2,7 +2,7 @@
 //! is no state of its plan.
 
 use hybank_runtime::{
-    Algorithm, Options, Plan, Precision, STATE_COUNTS, Shape, StateError, StateSpace, Stream,
+    Algorithm, Options, Plan, Precision, STATE_COUNTS, Shape, StateError, StateMatrices, Stream,
 };
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
@@ -40,7 +40,7 @@ fn recursion(channels: usize, order: usize) -> Plan {
     b[order].fill(0.0);
     b[order + 1] = (0..channels).map(|i| if i == 0 { 1.0 } else { 0.0 }).collect();
     let (c, d) = ((0..M).map(|i| numbers(size, 11 + i)).collect(), vec![vec![0.5; channels]; M]);
-    let system = StateSpace { a, b, c, d };
+    let system = StateMatrices { a, b, c, d };
     Plan::from_state_space(&system, Shape { channels, ratio: M }, 4, Options::default()).unwrap()
 }
 

@@ -6,7 +6,7 @@
 //! products are summed row by row in double precision, so their bits do not depend on the threads.
 
 use super::multigrid::Multigrid;
-use super::planes::{Blocks, BlocksMut, LANES, Planes, ROWS_AT_ONCE, blocks, blocks_mut};
+use super::planes::{BlocksMut, LANES, LaneBlocks, Planes, ROWS_AT_ONCE, blocks, blocks_mut};
 use super::stencil::{self, Stencil, sum, total};
 use super::{Convergence, Iteration};
 use rayon::prelude::*;
@@ -234,9 +234,9 @@ fn step_row(
     length: f32,
     u: BlocksMut<'_>,
     r: BlocksMut<'_>,
-    p: Blocks<'_>,
-    q: Blocks<'_>,
-    inverse: Blocks<'_>,
+    p: LaneBlocks<'_>,
+    q: LaneBlocks<'_>,
+    inverse: LaneBlocks<'_>,
 ) -> f64 {
     let mut sums = [0.0; LANES];
     let inputs = p.iter().zip(q).zip(inverse);
@@ -252,7 +252,7 @@ fn step_row(
 
 /// The sum of r r / d along a row.
 #[inline]
-fn energy_of(r: Blocks<'_>, inverse: Blocks<'_>) -> f64 {
+fn energy_of(r: LaneBlocks<'_>, inverse: LaneBlocks<'_>) -> f64 {
     let mut sums = [0.0; LANES];
     for (r, i) in r.iter().zip(inverse) {
         (0..LANES).for_each(|l| sums[l] += r[l] * r[l] * i[l]);

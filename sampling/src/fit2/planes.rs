@@ -173,12 +173,12 @@ impl<'a> RowsMut<'a> {
 }
 
 /// A row in blocks of [`LANES`].
-pub(super) type Blocks<'a> = &'a [[f32; LANES]];
+pub(super) type LaneBlocks<'a> = &'a [[f32; LANES]];
 pub(super) type BlocksMut<'a> = &'a mut [[f32; LANES]];
 
 /// The whole blocks of a row.
 #[inline(always)]
-pub(super) fn blocks(row: &[f32]) -> Blocks<'_> {
+pub(super) fn blocks(row: &[f32]) -> LaneBlocks<'_> {
     row.as_chunks().0
 }
 

@@ -55,7 +55,7 @@ pub(super) fn add(
         let (mut two_above, mut one_above) = (above(2), above(1));
         for (y, row) in (first..).zip(rows) {
             let here = springs(direction, y);
-            let mut row = Row { numbers: row, stride: grid.stride(), next, after };
+            let mut row = PlaneRow { numbers: row, stride: grid.stride(), next, after };
             match direction {
                 Direction::Across => row.add([0, 1, 2].map(|back| shifted(&here, back))),
                 Direction::Down => {
@@ -77,14 +77,14 @@ fn shifted(springs: &Springs, back: usize) -> (Vec<f32>, Vec<f32>) {
 }
 
 /// A row of all planes of a matrix, and the planes of a direction.
-struct Row<'a> {
+struct PlaneRow<'a> {
     numbers: &'a mut [f32],
     stride: usize,
     next: usize,
     after: usize,
 }
 
-impl Row<'_> {
+impl PlaneRow<'_> {
     /// Adds the edges and bends that begin at each coefficient, one before it and two before it.
     fn add<T: AsRef<[f32]>>(&mut self, [here, one, two]: [(T, T); 3]) {
         let (diagonal, others) = self.numbers.split_at_mut(self.stride);

@@ -1,6 +1,6 @@
 //! A symmetric matrix that couples each coefficient of a grid to its neighbours, one half stored.
 
-use super::planes::{Blocks, BlocksMut, Grid, LANES, Planes, ROWS_AT_ONCE, blocks, blocks_mut};
+use super::planes::{BlocksMut, Grid, LANES, LaneBlocks, Planes, ROWS_AT_ONCE, blocks, blocks_mut};
 use rayon::prelude::*;
 
 /// Columns to the right (negative: left) and rows down to a neighbour that comes later in memory.
@@ -83,7 +83,13 @@ impl Stencil {
     /// A row's couplings at offset k, and the coefficients of channel c that they belong to: those that the
     /// row stores, and those that an earlier row does. Zeros if there is no offset k or no such row.
     #[inline]
-    fn pair<'a>(&'a self, y: usize, k: usize, u: &'a Planes, c: usize) -> [(Blocks<'a>, Blocks<'a>); 2] {
+    fn pair<'a>(
+        &'a self,
+        y: usize,
+        k: usize,
+        u: &'a Planes,
+        c: usize,
+    ) -> [(LaneBlocks<'a>, LaneBlocks<'a>); 2] {
         let a = |start| self.row_from(&self.planes, start);
         let Some(offset) = self.offsets.get(k) else { return [(a(None), a(None)); 2] };
         let (entry, ahead) = (self.planes.start(y, k), u.after(y, c, *offset));
@@ -93,7 +99,7 @@ impl Stencil {
 
     /// The row of some images that begins there, zeros if there is none.
     #[inline]
-    fn row_from<'a>(&'a self, planes: &'a Planes, start: Option<usize>) -> Blocks<'a> {
+    fn row_from<'a>(&'a self, planes: &'a Planes, start: Option<usize>) -> LaneBlocks<'a> {
         blocks(start.map_or(&self.zeros[..], |start| &planes.data()[start..start + self.zeros.len()]))
     }
 
@@ -156,7 +162,7 @@ impl Stencil {
 
 /// out = a u.
 #[inline]
-fn set_product(out: BlocksMut<'_>, a: Blocks<'_>, u: Blocks<'_>) {
+fn set_product(out: BlocksMut<'_>, a: LaneBlocks<'_>, u: LaneBlocks<'_>) {
     for ((out, a), u) in out.iter_mut().zip(a).zip(u) {
         (0..LANES).for_each(|l| out[l] = a[l] * u[l]);
     }
@@ -164,7 +170,7 @@ fn set_product(out: BlocksMut<'_>, a: Blocks<'_>, u: Blocks<'_>) {
 
 /// out += a u for four rows of a and u: sums pass through the registers once for four products.
 #[inline]
-fn add_products(out: BlocksMut<'_>, terms: [(Blocks<'_>, Blocks<'_>); 4]) {
+fn add_products(out: BlocksMut<'_>, terms: [(LaneBlocks<'_>, LaneBlocks<'_>); 4]) {
     let n = out.len();
     let [(a0, u0), (a1, u1), (a2, u2), (a3, u3)] = terms.map(|(a, u)| (&a[..n], &u[..n]));
     for b in 0..n {
@@ -177,7 +183,7 @@ fn add_products(out: BlocksMut<'_>, terms: [(Blocks<'_>, Blocks<'_>); 4]) {
 
 /// u . v along a row.
 #[inline]
-pub(super) fn dot(u: Blocks<'_>, v: Blocks<'_>) -> f64 {
+pub(super) fn dot(u: LaneBlocks<'_>, v: LaneBlocks<'_>) -> f64 {
     let mut sums = [0.0; LANES];
     for (u, v) in u.iter().zip(v) {
         (0..LANES).for_each(|l| sums[l] += u[l] * v[l]);

@@ -18,7 +18,7 @@
 //! Order and attenuation of elliptic filters by the degree equation, in doubles: they choose the filter of a
 //! signal, and the chosen numbers stand for themselves.
 
-use super::{Long, dc_gain, excess_power, exp_asinh, product_of_negatives, upper_roots};
+use super::{LongBall, dc_gain, excess_power, exp_asinh, product_of_negatives, upper_roots};
 use crate::analog::roots::{Factors, RootSet};
 use crate::arithmetic::{Ball, ComplexBall, elementary};
 use std::f64::consts::{LN_10, PI};
@@ -37,7 +37,7 @@ const NEGLIGIBLE_TERM: f64 = f64::from_bits((1023 - 540) << 52);
 /// Elliptic: ripple of `ripple_db` up to the cutoff, attenuation of at least `attenuation_db` (>
 /// `ripple_db` > 0) beyond the stop-band edge, which follows from order and ripples. An even order has as
 /// many zeros as poles.
-pub(super) fn elliptic(order: usize, ripple_db: f64, attenuation_db: f64) -> Factors<Long> {
+pub(super) fn elliptic(order: usize, ripple_db: f64, attenuation_db: f64) -> Factors<LongBall> {
     let (one, ripple) = (Ball::from(1.0), excess_power(ripple_db));
     let slope = one / ripple.sqrt();
     if order == 1 {
@@ -64,9 +64,9 @@ pub(super) fn elliptic(order: usize, ripple_db: f64, attenuation_db: f64) -> Fac
 /// What Landen's descending transformation gives for the modulus k with k^2 = `ripple` / `attenuation`.
 struct Landen {
     /// q^(1/2).
-    nome_root: Long,
+    nome_root: LongBall,
     /// e^(pi v / 2) with sc(v K, k') = `ripple`^(-1/2).
-    stretch: Long,
+    stretch: LongBall,
 }
 
 impl Landen {
@@ -83,7 +83,7 @@ impl Landen {
     /// 0 <= d <= 1 - k' (1 + k^2 S^2)^(-1/2) <= k^2 (1 + S^2). And k = 4 q^(1/2) times the product of
     /// ((1 + q^2m) / (1 + q^(2m-1)))^4, which lies between 1 - 5 q and 1 for q < 0.1, so that q^(1/2) = k/4
     /// up to a factor within k^2 of 1.
-    fn new(ripple: Long, attenuation: Long) -> Self {
+    fn new(ripple: LongBall, attenuation: LongBall) -> Self {
         let (one, two) = (Ball::from(1.0), Ball::from(2.0));
         let (mut k, mut complement) =
             ((ripple / attenuation).sqrt(), ((attenuation - ripple) / attenuation).sqrt());
@@ -110,13 +110,13 @@ impl Landen {
 
 /// The function i sn of x = e^(i z) for one nome.
 struct Sine {
-    nome: Long,
+    nome: LongBall,
     /// c.
-    factor: Long,
+    factor: LongBall,
 }
 
 impl Sine {
-    fn new(nome: Long) -> Self {
+    fn new(nome: LongBall) -> Self {
         let minus = ComplexBall::from(Ball::from(-1.0));
         Self { nome, factor: theta(nome, minus).re / theta(nome, minus.scaled(nome)).re }
     }
@@ -130,7 +130,7 @@ impl Sine {
 
 /// T(y). From some term on each is at most half of the one before it, so that all others together are at
 /// most as large as the last.
-fn theta(nome: Long, y: ComplexBall) -> ComplexBall {
+fn theta(nome: LongBall, y: ComplexBall) -> ComplexBall {
     let one = ComplexBall::from(Ball::from(1.0));
     let (inverse, square) = (one / y, nome * nome);
     let size = |z: ComplexBall| z.re.magnitude() + z.im.magnitude();

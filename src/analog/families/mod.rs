@@ -15,12 +15,10 @@ pub(super) use elliptic::Selectivity;
 use super::polynomial::isolated;
 use super::roots::{Factors, RootSet};
 use super::{AnalogError, MIN_DAMPING_RATIO};
-use crate::arithmetic::{Ball, ComplexBall, Float512, Number, elementary};
+use crate::arithmetic::{Ball, ComplexBall, Float, Float512, LongBall, elementary};
 use crate::spec::{Family, MAX_ORDER, Passband, refused};
 use crate::units::Seconds;
 use std::sync::OnceLock;
-
-type Long = Ball<Float512>;
 
 /// Radius over midpoint up to which a number counts as resolved: its double is right then, and the
 /// proofs need a few digits more.
@@ -43,7 +41,11 @@ pub(super) struct Member {
 /// # Errors
 /// [`AnalogError::Filter`] where the transition band or the band is too narrow for the poles;
 /// [`AnalogError::RootsNotIsolated`].
-pub(super) fn placed(member: &Member, passband: Passband, h: Seconds) -> Result<Factors<Long>, AnalogError> {
+pub(super) fn placed(
+    member: &Member,
+    passband: Passband,
+    h: Seconds,
+) -> Result<Factors<LongBall>, AnalogError> {
     let prototype = prototype(member)?;
     if !is_damped(&prototype) {
         let rule = format!(
@@ -68,10 +70,10 @@ pub(super) fn placed(member: &Member, passband: Passband, h: Seconds) -> Result<
 }
 
 /// Whether all numbers are resolved and all poles have the least damping.
-fn is_damped(filter: &Factors<Long>) -> bool {
-    let is_resolved = |x: Long| x.radius() <= RESOLVED_RADIUS * x.nearest().abs();
-    let real = |&p: &Long| is_resolved(p) && p.nearest() < 0.0;
-    let pair = |&(re, im): &(Long, Long)| {
+fn is_damped(filter: &Factors<LongBall>) -> bool {
+    let is_resolved = |x: LongBall| x.radius() <= RESOLVED_RADIUS * x.nearest().abs();
+    let real = |&p: &LongBall| is_resolved(p) && p.nearest() < 0.0;
+    let pair = |&(re, im): &(LongBall, LongBall)| {
         let (re, im, resolved) = (re.nearest(), im.nearest(), is_resolved(re) && is_resolved(im));
         resolved && -re >= MIN_DAMPING_RATIO * re.hypot(im)
     };
@@ -83,7 +85,7 @@ fn is_damped(filter: &Factors<Long>) -> bool {
 ///
 /// # Errors
 /// [`AnalogError::RootsNotIsolated`] for a Bessel polynomial.
-pub(super) fn prototype(member: &Member) -> Result<Factors<Long>, AnalogError> {
+pub(super) fn prototype(member: &Member) -> Result<Factors<LongBall>, AnalogError> {
     let Member { order, ripple_db, attenuation_db, .. } = *member;
     Ok(match member.family {
         Family::Butterworth => butterworth(order),
@@ -96,7 +98,7 @@ pub(super) fn prototype(member: &Member) -> Result<Factors<Long>, AnalogError> {
 }
 
 /// Poles evenly on the unit circle, -3.01 dB at the cutoff.
-fn butterworth(order: usize) -> Factors<Long> {
+fn butterworth(order: usize) -> Factors<LongBall> {
     let pole = |angle: ComplexBall| ComplexBall::new(-angle.re, angle.im);
     Factors { zeros: RootSet::default(), poles: upper_roots(order, pole), gain: Ball::from(1.0) }
 }
@@ -104,7 +106,7 @@ fn butterworth(order: usize) -> Factors<Long> {
 /// `root` for each angle of the Butterworth poles, counted from the negative real axis: j / n times 90
 /// degrees, j = n - 1, n - 3, .. down to 1 or 0. It takes cos + i sin of the angle and gives an upper
 /// root, for the angle 0 a real one.
-fn upper_roots(order: usize, root: impl Fn(ComplexBall) -> ComplexBall) -> RootSet<Long> {
+fn upper_roots(order: usize, root: impl Fn(ComplexBall) -> ComplexBall) -> RootSet<LongBall> {
     let mut roots = RootSet::default();
     for z in angles(order) {
         let root = root(z);
@@ -126,36 +128,36 @@ fn angles(order: usize) -> impl Iterator<Item = ComplexBall> {
 
 /// The point at this angle on the ellipse with half axes sinh(mu), cosh(mu), counted from the negative real
 /// axis, for `stretch` = e^mu.
-fn on_ellipse(stretch: Long, angle: ComplexBall) -> ComplexBall {
+fn on_ellipse(stretch: LongBall, angle: ComplexBall) -> ComplexBall {
     let (half, inverse) = (Ball::from(0.5), Ball::from(1.0) / stretch);
     ComplexBall::new(angle.re * (inverse - stretch) * half, angle.im * (inverse + stretch) * half)
 }
 
 /// prod(-roots), real by conjugate symmetry.
-fn product_of_negatives(roots: &RootSet<Long>) -> Long {
+fn product_of_negatives(roots: &RootSet<LongBall>) -> LongBall {
     let real = roots.real.iter().fold(Ball::from(1.0), |product, &r| product * -r);
     roots.upper.iter().fold(real, |product, &(re, im)| product * (re * re + im * im))
 }
 
 /// The gain at 0 of a filter with this power of ripple: the ripple for an even order.
-fn dc_gain(order: usize, ripple: Long) -> Long {
+fn dc_gain(order: usize, ripple: LongBall) -> LongBall {
     let one = Ball::from(1.0);
     if order.is_multiple_of(2) { one / (one + ripple).sqrt() } else { one }
 }
 
 /// 10^(db/10) - 1.
-fn excess_power(db: f64) -> Long {
+fn excess_power(db: f64) -> LongBall {
     elementary::exp_m1(Ball::from(db) * elementary::ln_10() / Ball::from(10.0))
 }
 
 /// e^asinh(x).
-fn exp_asinh(x: Long) -> Long {
+fn exp_asinh(x: LongBall) -> LongBall {
     x + (Ball::from(1.0) + x * x).sqrt()
 }
 
 /// Chebyshev 1: poles on an ellipse. The gain ripples by `ripple_db` (> 0 dB) below the cutoff and falls
 /// above it.
-fn chebyshev1(order: usize, ripple_db: f64) -> Factors<Long> {
+fn chebyshev1(order: usize, ripple_db: f64) -> Factors<LongBall> {
     let ripple = excess_power(ripple_db);
     let stretch = elementary::root(exp_asinh(Ball::from(1.0) / ripple.sqrt()), order);
     let poles = upper_roots(order, |angle| on_ellipse(stretch, angle));
@@ -165,7 +167,7 @@ fn chebyshev1(order: usize, ripple_db: f64) -> Factors<Long> {
 
 /// Chebyshev 2 (inverse Chebyshev): the attenuation is at least `attenuation_db` (> 0 dB) from the cutoff
 /// on. An even order has as many zeros as poles.
-fn chebyshev2(order: usize, attenuation_db: f64) -> Factors<Long> {
+fn chebyshev2(order: usize, attenuation_db: f64) -> Factors<LongBall> {
     let stretch = elementary::root(exp_asinh(excess_power(attenuation_db).sqrt()), order);
     let poles = upper_roots(order, |angle| {
         let z = on_ellipse(stretch, angle);
@@ -184,9 +186,9 @@ fn chebyshev2(order: usize, attenuation_db: f64) -> Factors<Long> {
 ///
 /// # Errors
 /// [`AnalogError::RootsNotIsolated`]. The tests cover all orders up to [`MAX_ORDER`].
-fn bessel(order: usize) -> Result<Factors<Long>, AnalogError> {
+fn bessel(order: usize) -> Result<Factors<LongBall>, AnalogError> {
     // The roots of an order are always the same, and those of a high order take milliseconds.
-    static POLES: [OnceLock<Option<RootSet<Long>>>; MAX_ORDER + 1] =
+    static POLES: [OnceLock<Option<RootSet<LongBall>>>; MAX_ORDER + 1] =
         [const { OnceLock::new() }; MAX_ORDER + 1];
     let poles = POLES.get(order).and_then(|poles| poles.get_or_init(|| scaled_roots(order)).clone());
     let poles = poles.ok_or(AnalogError::RootsNotIsolated { what: "family" })?;
@@ -194,7 +196,7 @@ fn bessel(order: usize) -> Result<Factors<Long>, AnalogError> {
 }
 
 /// The zeros of theta_n in units of their geometric mean, theta_n(0)^(1/n).
-fn scaled_roots(n: usize) -> Option<RootSet<Long>> {
+fn scaled_roots(n: usize) -> Option<RootSet<LongBall>> {
     let coefficients = reverse_bessel(n);
     let mean = elementary::root(Ball::exactly(*coefficients.last()?), n);
     Some(isolated(&coefficients)?.scaled(Ball::from(1.0) / mean))

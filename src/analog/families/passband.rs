@@ -1,6 +1,6 @@
 //! A prototype at its place: low-pass or band-pass in normalised time.
 
-use super::Long;
+use super::LongBall;
 use crate::analog::roots::{Factors, RootSet};
 use crate::arithmetic::{Ball, ComplexBall, Real, elementary};
 use crate::spec::Passband;
@@ -8,10 +8,10 @@ use crate::units::{Hertz, Seconds};
 
 /// `prototype`, whose cutoff lies at |s| = 1, moved to `passband`, in normalised time.
 pub(in crate::analog) fn moved(
-    prototype: &Factors<Long>,
+    prototype: &Factors<LongBall>,
     passband: Passband,
     fast_period: Seconds,
-) -> Factors<Long> {
+) -> Factors<LongBall> {
     // 2 pi f h.
     let angular =
         |Hertz(f): Hertz| elementary::pi() * Ball::from(2.0) * Ball::from(f) * Ball::from(fast_period.0);
@@ -26,9 +26,9 @@ pub(in crate::analog) fn moved(
 
 /// H((s^2 + w^2) / (s `width`)) with w^2 = `square`: two roots for every root of the prototype, and a
 /// zero at 0 for every pole without a zero.
-fn band_pass(prototype: &Factors<Long>, width: Long, square: Long) -> Factors<Long> {
+fn band_pass(prototype: &Factors<LongBall>, width: LongBall, square: LongBall) -> Factors<LongBall> {
     let half = width * Ball::from(0.5);
-    let moved = |roots: &RootSet<Long>| {
+    let moved = |roots: &RootSet<LongBall>| {
         let mut moved = RootSet::default();
         roots.real.iter().for_each(|&r| push_real(&mut moved, r * half, square));
         roots
@@ -46,7 +46,7 @@ fn band_pass(prototype: &Factors<Long>, width: Long, square: Long) -> Factors<Lo
 
 /// The roots u +- sqrt(u^2 - w^2) for a real u: both are real, or they are conjugates. A square root
 /// that may be of either kind is unknown.
-fn push_real(roots: &mut RootSet<Long>, u: Long, square: Long) {
+fn push_real(roots: &mut RootSet<LongBall>, u: LongBall, square: LongBall) {
     let discriminant = u * u - square;
     if discriminant.nearest() > 0.0 {
         let root = discriminant.sqrt();
@@ -57,7 +57,7 @@ fn push_real(roots: &mut RootSet<Long>, u: Long, square: Long) {
 }
 
 /// The upper ones of the roots u +- sqrt(u^2 - w^2) and their conjugates.
-fn push_pair(roots: &mut RootSet<Long>, u: ComplexBall, square: Long) {
+fn push_pair(roots: &mut RootSet<LongBall>, u: ComplexBall, square: LongBall) {
     if u.re.is_zero() {
         // Both roots lie on the imaginary axis.
         let root = (u.im * u.im + square).sqrt();

@@ -15,13 +15,13 @@ struct Rounded {
     gain: f64,
 }
 
-impl From<Factors<Long>> for Rounded {
-    fn from(factors: Factors<Long>) -> Self {
-        let pair = |re: Long, im: Long| {
+impl From<Factors<LongBall>> for Rounded {
+    fn from(factors: Factors<LongBall>) -> Self {
+        let pair = |re: LongBall, im: LongBall| {
             let z = Complex::new(re.nearest(), im.nearest());
             [z, z.conj()]
         };
-        let list = |roots: &RootSet<Long>| -> Vec<Complex<f64>> {
+        let list = |roots: &RootSet<LongBall>| -> Vec<Complex<f64>> {
             let real = roots.real.iter().map(|r| r.nearest().into());
             real.chain(roots.upper.iter().flat_map(|&(re, im)| pair(re, im))).collect()
         };
@@ -83,7 +83,7 @@ fn reference(line: &'static str) -> Reference {
 }
 
 /// A decimal number with its digits, whose last one may be off by one.
-fn decimal(text: &str) -> Long {
+fn decimal(text: &str) -> LongBall {
     let (digits, exponent) = text.split_once('e').unwrap_or((text, "0"));
     let (digits, sign) = digits.strip_prefix('-').map_or((digits, 1.0), |digits| (digits, -1.0));
     let ten = Ball::from(10.0);
@@ -95,10 +95,10 @@ fn decimal(text: &str) -> Long {
 }
 
 /// prod(1/2 - roots).
-fn at_half(roots: &RootSet<Long>) -> Long {
+fn at_half(roots: &RootSet<LongBall>) -> LongBall {
     let (one, half) = (Ball::from(1.0), Ball::from(0.5));
     let real = roots.real.iter().fold(one, |product, &r| product * (half - r));
-    let square = |re: Long, im: Long| (half - re) * (half - re) + im * im;
+    let square = |re: LongBall, im: LongBall| (half - re) * (half - re) + im * im;
     roots.upper.iter().fold(real, |product, &(re, im)| product * square(re, im))
 }
 

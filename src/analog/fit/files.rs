@@ -4,7 +4,7 @@ use super::{MeasuredResponse, vector_fit};
 use crate::files::{self, Bound};
 use crate::messages::Quoted;
 use crate::quantity::readable;
-use crate::spec::{FilterModel, MeasuredFilter, Measurement};
+use crate::spec::{FilterModel, MeasuredFilter, MeasurementFile};
 use std::cell::RefCell;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -17,13 +17,13 @@ const MEASUREMENT: Bound =
 ///
 /// ```
 /// use hybank::analog::fit::Measurements;
-/// use hybank::spec::{MeasuredFilter, Measurement};
+/// use hybank::spec::{MeasuredFilter, MeasurementFile};
 /// use hybank::units::Seconds;
 /// let folder = std::env::temp_dir().join(format!("hybank-fit-{}", std::process::id()));
 /// std::fs::create_dir_all(&folder)?;
 /// std::fs::write(folder.join("rc.csv"), "f (kHz),dB,deg\n0,0,0\n1,-3.0103,-45\n2,-6.9897,-63.4349\n")?;
 /// let measurements = Measurements::in_folder(folder.clone());
-/// let (path, measurement) = ("rc.csv".into(), Measurement::Response);
+/// let (path, measurement) = ("rc.csv".into(), MeasurementFile::Response);
 /// let model = measurements.model(&MeasuredFilter { path, measurement, order: 1, deembed: Seconds(0.0) })?;
 /// assert!(model.error.0 < 1e-4);
 /// assert_eq!(measurements.files(), [folder.join("rc.csv")]);
@@ -92,7 +92,7 @@ impl Measurements {
 }
 
 fn response(path: &Path, text: &str, wanted: &MeasuredFilter) -> Result<MeasuredResponse, String> {
-    let Measurement::Touchstone(parameter) = &wanted.measurement else {
+    let MeasurementFile::Touchstone(parameter) = &wanted.measurement else {
         return MeasuredResponse::from_csv(text).map_err(|error| error.to_string());
     };
     let extension = path.extension().and_then(|extension| extension.to_str()).unwrap_or_default();

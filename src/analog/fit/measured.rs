@@ -1,7 +1,7 @@
 //! A response on a list of frequencies.
 
 use super::MeasurementError;
-use super::text::{Point, read_table};
+use super::text::{ResponseLine, read_table};
 use super::touchstone;
 use crate::linalg::Complex;
 use crate::units::{Hertz, Seconds};
@@ -40,7 +40,7 @@ impl MeasuredResponse {
     }
 
     /// Of lines with their numbers.
-    fn new(points: Vec<Point>) -> Result<Self, MeasurementError> {
+    fn new(points: Vec<ResponseLine>) -> Result<Self, MeasurementError> {
         if points.is_empty() {
             return Err(MeasurementError::Empty);
         }

@@ -5,7 +5,7 @@ use crate::linalg::Complex;
 use crate::units::Hertz;
 
 /// A line, counted from 1, with its frequency and value.
-pub(super) type Point = (usize, Hertz, Complex<f64>);
+pub(super) type ResponseLine = (usize, Hertz, Complex<f64>);
 
 /// The hertz of a unit of frequency.
 pub(super) fn hertz(unit: &str) -> Option<f64> {
@@ -24,13 +24,13 @@ pub(super) fn numbers<'a>(words: impl Iterator<Item = &'a str>) -> Option<Vec<f6
 }
 
 /// A measured point, if frequency and value are in range.
-pub(super) fn point(line: usize, frequency: f64, value: Complex<f64>) -> Option<Point> {
+pub(super) fn point(line: usize, frequency: f64, value: Complex<f64>) -> Option<ResponseLine> {
     let is_good = (0.0..1e18).contains(&frequency) && value.norm() < 1e30;
     is_good.then_some((line, Hertz(frequency), value))
 }
 
 /// The points with their lines.
-pub(super) fn read_table(text: &str) -> Result<Vec<Point>, MeasurementError> {
+pub(super) fn read_table(text: &str) -> Result<Vec<ResponseLine>, MeasurementError> {
     let lines = (1..).zip(text.trim_start_matches('\u{feff}').lines());
     let mut lines = lines.filter(|(_, line)| !line.trim().is_empty() && !line.trim_start().starts_with('#'));
     let Some((_, heading)) = lines.next() else { return Err(MeasurementError::Empty) };

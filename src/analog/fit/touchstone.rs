@@ -3,19 +3,19 @@
 //! Source: *Touchstone File Format Specification*, version 1.1, EIA/IBIS Open Forum.
 
 use super::MeasurementError;
-use super::text::{Point, hertz, numbers, of_decibels, point};
+use super::text::{ResponseLine, hertz, numbers, of_decibels, point};
 use crate::linalg::Complex;
 use crate::messages::Quoted;
 
 /// The option line.
 #[derive(Debug, Clone, Copy)]
-struct Options {
+struct OptionLine {
     hertz: f64,
     /// The complex number of a pair.
     value: fn(f64, f64) -> Complex<f64>,
 }
 
-impl Default for Options {
+impl Default for OptionLine {
     fn default() -> Self {
         Self { hertz: 1e9, value: of_magnitude }
     }
@@ -30,7 +30,7 @@ pub(super) fn read(
     text: &str,
     ports: usize,
     parameter: Option<&str>,
-) -> Result<Vec<Point>, MeasurementError> {
+) -> Result<Vec<ResponseLine>, MeasurementError> {
     let mut network = Network { ports, column: column(ports, parameter)?, options: None, points: Vec::new() };
     for (line, whole) in (1..).zip(text.lines()) {
         let content = whole.split('!').next().unwrap_or_default().trim();
@@ -60,8 +60,8 @@ struct Network {
     /// Of the parameter, among those of a line.
     column: usize,
     /// Of the option line, once it was there.
-    options: Option<Options>,
-    points: Vec<Point>,
+    options: Option<OptionLine>,
+    points: Vec<ResponseLine>,
 }
 
 impl Network {
@@ -89,11 +89,11 @@ impl Network {
     }
 
     /// None for another number of numbers, or numbers that are no point.
-    fn point(&self, line: usize, row: &[f64]) -> Option<Point> {
+    fn point(&self, line: usize, row: &[f64]) -> Option<ResponseLine> {
         if row.len() != self.width() {
             return None;
         }
-        let Options { value, .. } = self.options.unwrap_or_default();
+        let OptionLine { value, .. } = self.options.unwrap_or_default();
         let pair = 1 + 2 * self.column;
         point(line, self.frequency(row), value(row[pair], row[pair + 1]))
     }
@@ -114,8 +114,8 @@ fn column(ports: usize, parameter: Option<&str>) -> Result<usize, MeasurementErr
 }
 
 /// `# GHz S MA R 50`, its parts in any order and each with a default.
-fn option_line(line: usize, words: &str) -> Result<Options, MeasurementError> {
-    let mut options = Options::default();
+fn option_line(line: usize, words: &str) -> Result<OptionLine, MeasurementError> {
+    let mut options = OptionLine::default();
     let mut words = words.split_whitespace();
     while let Some(word) = words.next() {
         if let Some(hertz) = hertz(word) {

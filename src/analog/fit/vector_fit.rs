@@ -81,10 +81,10 @@ impl Data {
 fn best_model(measured: &MeasuredResponse, order: usize) -> Result<FittedModel, FitError> {
     let data = Data::new(measured)?;
     let mut poles = starting_poles(order, 1.0);
-    let mut best: Option<Candidate> = None;
+    let mut best: Option<RationalModel> = None;
     let mut last_better = 0;
     for round in 0..MOST_ROUNDS {
-        let candidate = Candidate::new(&data, poles.clone())?;
+        let candidate = RationalModel::new(&data, poles.clone())?;
         if best.as_ref().is_none_or(|best| candidate.rms < 0.999 * best.rms) {
             last_better = round;
             best = Some(candidate);
@@ -97,14 +97,14 @@ fn best_model(measured: &MeasuredResponse, order: usize) -> Result<FittedModel, 
 }
 
 /// A model with its residues.
-struct Candidate {
+struct RationalModel {
     poles: Vec<Pole>,
     residues: Vec<f64>,
     rms: f64,
     worst: (f64, Complex<f64>),
 }
 
-impl Candidate {
+impl RationalModel {
     /// The residues of least mean-square error.
     fn new(data: &Data, poles: Vec<Pole>) -> Result<Self, FitError> {
         let n = order(&poles);

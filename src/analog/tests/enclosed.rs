@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::analog::{Realisation, enclosed};
-use crate::arithmetic::{Ball, ComplexBall, Float512};
+use crate::arithmetic::{Ball, ComplexBall, LongBall};
 
 fn real(x: f64) -> ComplexBall {
     Ball::from(x).into()
@@ -16,7 +16,7 @@ fn complex([re, im]: [f64; 2]) -> ComplexBall {
 }
 
 /// d + c (s - a)^-1 b, by elimination.
-fn response_of(equations: &Realisation<Ball<Float512>>, s: ComplexBall) -> ComplexBall {
+fn response_of(equations: &Realisation<LongBall>, s: ComplexBall) -> ComplexBall {
     let n = equations.order();
     let mut pencil = DMatrix::from_fn(n, n, |i, j| {
         let a = ComplexBall::from(equations.a[(i, j)]);
@@ -49,7 +49,7 @@ fn quotient(num: &[f64], den: &[f64], s: ComplexBall) -> ComplexBall {
 /// Whether both balls enclose one number, to 100 digits relative to it.
 fn agree(x: ComplexBall, y: ComplexBall) -> bool {
     let apart = x - y;
-    let holds_zero = |part: Ball<Float512>| part.nearest().abs() <= part.radius();
+    let holds_zero = |part: LongBall| part.nearest().abs() <= part.radius();
     let size = y.norm_sqr().nearest().sqrt();
     holds_zero(apart.re) && holds_zero(apart.im) && apart.re.radius() + apart.im.radius() <= 1e-100 * size
 }

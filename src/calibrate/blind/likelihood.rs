@@ -1,8 +1,8 @@
 //! The Whittle likelihood of spectral matrices: its score and its Fisher information.
 
-use super::spectra::Band;
-use crate::calibrate::fit::Kind;
-use crate::calibrate::model::{Model, Parameter, Point};
+use super::spectra::SpectralBand;
+use crate::calibrate::fit::ChannelParameter;
+use crate::calibrate::model::{ChannelModel, ChannelValues, Parameter};
 use crate::linalg::least_squares::NormalEquations;
 use crate::linalg::{CMat, Complex, Mat, solve};
 
@@ -17,7 +17,7 @@ pub(super) struct BandScore {
 }
 
 /// The aliases k of lowest frequency |W + 2 pi k|, `count` of them.
-pub(super) fn lowest_aliases(model: &Model, w: f64, count: usize) -> Vec<i32> {
+pub(super) fn lowest_aliases(model: &ChannelModel, w: f64, count: usize) -> Vec<i32> {
     let reach = count as i32;
     let mut aliases: Vec<i32> = (-reach..=reach).collect();
     aliases.sort_by(|a, b| model.alias(w, *a).abs().total_cmp(&model.alias(w, *b).abs()));
@@ -37,7 +37,12 @@ pub(super) fn lowest_aliases(model: &Model, w: f64, count: usize) -> Vec<i32> {
 /// gradient_a     = 2 L / s Re tr(G A^+ R^ P dA_a)
 /// information_ab = 2 L / s Re tr(dA_a* P dA_b G S)
 /// ```
-pub(super) fn band_score(model: &Model, point: &Point, band: &Band, aliases: &[i32]) -> Option<BandScore> {
+pub(super) fn band_score(
+    model: &ChannelModel,
+    point: &ChannelValues,
+    band: &SpectralBand,
+    aliases: &[i32],
+) -> Option<BandScore> {
     let (a, sources) = (model.steering(point, band.w, aliases), aliases.len());
     let inverse = solve(&(a.adjoint() * &a), &a.adjoint());
     let projection = CMat::identity(a.nrows(), a.nrows()) - &a * &inverse;
@@ -69,8 +74,8 @@ pub(super) fn band_score(model: &Model, point: &Point, band: &Band, aliases: &[i
 
 /// The row of dA that is not zero.
 fn derivative(
-    model: &Model,
-    point: &Point,
+    model: &ChannelModel,
+    point: &ChannelValues,
     w: f64,
     aliases: &[i32],
     parameter: &Parameter,
@@ -80,9 +85,9 @@ fn derivative(
     CMat::from_fn(1, aliases.len(), |_, k| {
         let nu = model.alias(w, aliases[k]);
         let factor = match parameter.kind {
-            Kind::Delay => Complex::new(0.0, -nu),
-            Kind::Gain => Complex::ONE,
-            Kind::Cutoff => model.cutoff_slope(i, nu, point.ln_cutoffs[i]),
+            ChannelParameter::Delay => Complex::new(0.0, -nu),
+            ChannelParameter::Gain => Complex::ONE,
+            ChannelParameter::Cutoff => model.cutoff_slope(i, nu, point.ln_cutoffs[i]),
         };
         factor * a[(i, k)]
     })

@@ -26,13 +26,13 @@ mod spectra;
 #[cfg(test)]
 mod tests;
 
-use super::Settings;
+use super::CalibrationSettings;
 use super::error::CalibrateError;
 use super::estimates::{Fitted, WORST_CONDITION};
-use super::fit::{Fit, Kind};
-use super::model::{Model, Point};
+use super::fit::{ChannelParameter, FittedValues};
+use super::model::{ChannelModel, ChannelValues};
 use super::record::{Record, longest_run};
-use super::warning::Warning;
+use super::warning::CalibrationWarning;
 use crate::linalg::least_squares::{LeastSquares, Minimum, NoMinimum, NormalEquations, StepLimits, minimise};
 use crate::linalg::solve;
 use crate::sine_fit::Estimate;
@@ -40,7 +40,7 @@ use likelihood::{band_score, lowest_aliases};
 use single::bands_within;
 pub(super) use single::{SingleBand, unexplained_in_order};
 use spectra::occupied;
-pub(super) use spectra::{Band, Spectra};
+pub(super) use spectra::{Spectra, SpectralBand};
 use std::ops::RangeInclusive;
 
 /// Least number of frames in a row.
@@ -58,13 +58,13 @@ const FARTHEST_LOGARITHM: f64 = 3.0;
 
 /// Bands whose aliases were found.
 struct Occupied {
-    band: Band,
+    band: SpectralBand,
     aliases: Vec<i32>,
 }
 
 /// The data of a blind fit.
 pub(super) struct Blind<'a> {
-    model: &'a Model,
+    model: &'a ChannelModel,
     spectra: Spectra,
     frames: usize,
     /// Bands with more aliases are left out.
@@ -74,7 +74,7 @@ pub(super) struct Blind<'a> {
 /// The maximum of the likelihood, or the way to it.
 pub(super) struct Maximum<'a> {
     blind: &'a Blind<'a>,
-    point: Point,
+    point: ChannelValues,
     /// The bands that are used, by their frequency, and the number of their aliases. They stay the same ones
     /// while the point moves; only their phases follow it.
     used: Vec<(f64, usize)>,
@@ -122,7 +122,7 @@ impl LeastSquares for Maximum<'_> {
     }
 
     fn limits(&self, k: usize, sigma: f64) -> StepLimits {
-        let is_delay = self.point.parameters[k].kind == Kind::Delay;
+        let is_delay = self.point.parameters[k].kind == ChannelParameter::Delay;
         let largest = if is_delay { LARGEST_STEP } else { f64::INFINITY };
         StepLimits { largest, negligible: SMALL_STEP * sigma }
     }
@@ -140,7 +140,7 @@ fn add(sum: &mut NormalEquations, other: &NormalEquations) {
 impl<'a> Blind<'a> {
     /// Of the longest run of frames that no record lacks; bands with more than so many aliases are left out.
     pub(super) fn new(
-        model: &'a Model,
+        model: &'a ChannelModel,
         records: &[Record],
         most_aliases: usize,
     ) -> Result<Self, CalibrateError> {
@@ -155,16 +155,16 @@ impl<'a> Blind<'a> {
 
     /// The estimates at the maximum of the likelihood near the nominal values, with the warnings that their
     /// intervals call for.
-    pub(super) fn fit(&self, settings: Settings) -> Result<Fitted, CalibrateError> {
-        let Settings { fit, reference } = settings;
-        let first = self.ascended(Point::nominal(self.model, fit, reference), FIRST_LEAST)?.0;
+    pub(super) fn fit(&self, settings: CalibrationSettings) -> Result<Fitted, CalibrateError> {
+        let CalibrationSettings { fit, reference } = settings;
+        let first = self.ascended(ChannelValues::nominal(self.model, fit, reference), FIRST_LEAST)?.0;
         let (maximum, minimum) = self.ascended(first.point, FINAL_LEAST)?;
         let factor = self.spectra.variance_factor;
         let disagreement = maximum.disagreement(factor);
         let offsets = fit.offset.then(|| maximum.offsets(reference));
         let mut fitted = Fitted::new(maximum.point, minimum.inverse * factor, self.frames);
         let misfit = disagreement.and_then(|(squares, freedom)| fitted.widen(squares, freedom));
-        fitted.warnings.extend(misfit.map(|misfit| Warning::BandsDisagree { misfit }));
+        fitted.warnings.extend(misfit.map(|misfit| CalibrationWarning::BandsDisagree { misfit }));
         fitted.offsets = offsets;
         Ok(fitted)
     }
@@ -172,14 +172,14 @@ impl<'a> Blind<'a> {
     fn bands(&self, delays: &[f64], least: f64) -> Vec<Occupied> {
         let bands = self.spectra.bands(delays);
         let counts = occupied(&bands, least);
-        let of = |(band, count): (Band, usize)| {
+        let of = |(band, count): (SpectralBand, usize)| {
             let aliases = lowest_aliases(self.model, band.w, count);
             (1..=self.most_aliases).contains(&count).then_some(Occupied { band, aliases })
         };
         bands.into_iter().zip(counts).filter_map(of).collect()
     }
 
-    fn ascended(&self, point: Point, least: f64) -> Result<(Maximum<'_>, Minimum), CalibrateError> {
+    fn ascended(&self, point: ChannelValues, least: f64) -> Result<(Maximum<'_>, Minimum), CalibrateError> {
         let used = self.bands(&point.delays, least);
         let used: Vec<(f64, usize)> = used.iter().map(|used| (used.band.w, used.aliases.len())).collect();
         if used.is_empty() {
@@ -205,9 +205,9 @@ impl<'a> Blind<'a> {
 
     /// The power that one alias per band leaves unexplained: with the nominal values and whichever alias
     /// fits a band best, and at the maximum.
-    pub(super) fn unexplained(&self, found: &Point) -> (f64, f64) {
+    pub(super) fn unexplained(&self, found: &ChannelValues) -> (f64, f64) {
         let nominal = self.nominal();
-        let left = |point: &Point, band: &Band, alias: i32| {
+        let left = |point: &ChannelValues, band: &SpectralBand, alias: i32| {
             band.unexplained(&self.model.steering(point, band.w, &[alias]))
         };
         let used = self.bands(&found.delays, FIRST_LEAST);
@@ -217,8 +217,8 @@ impl<'a> Blind<'a> {
         (before, used.iter().map(|used| left(found, &used.band, used.aliases[0])).sum())
     }
 
-    fn nominal(&self) -> Point {
-        Point::nominal(self.model, Fit::default(), 0)
+    fn nominal(&self) -> ChannelValues {
+        ChannelValues::nominal(self.model, FittedValues::default(), 0)
     }
 
     fn least_over_aliases(&self, left: impl Fn(i32) -> f64) -> f64 {

@@ -5,8 +5,8 @@
 //! that were removed from the matrix are those of the given order. It explains `l |u* c|^2 / |c|^2` of the
 //! power. The factors of i and of o(i) part, so an order costs one product per channel, band and alias.
 
-use super::spectra::Band;
-use crate::calibrate::model::{Model, Point};
+use super::spectra::SpectralBand;
+use crate::calibrate::model::{ChannelModel, ChannelValues};
 use crate::linalg::{CMat, Complex, svd};
 
 /// Most products in the comparison of all orders: half a second.
@@ -34,9 +34,9 @@ pub(super) fn bands_within(products: usize) -> usize {
 impl SingleBand {
     /// `band` as one of the `aliases` at `point`; `None` where the matrix has no decomposition.
     pub(super) fn new(
-        model: &Model,
-        point: &Point,
-        band: &Band,
+        model: &ChannelModel,
+        point: &ChannelValues,
+        band: &SpectralBand,
         aliases: impl Iterator<Item = i32>,
     ) -> Option<Self> {
         let matrix = svd(&band.matrix).ok()?;
@@ -72,24 +72,24 @@ pub(in crate::calibrate) fn unexplained_in_order(bands: &[SingleBand], order: &[
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::Fit;
+    use crate::calibrate::FittedValues;
     use crate::spec::Spec;
 
-    fn model() -> Model {
+    fn model() -> ChannelModel {
         let text = "fast_period = 1.0\nratio = 4\nlatency = 8\n\
                     channel = [{ delay = 0.3 }, { delay = 1.2, gain = 1.1 }, { delay = 2.9 }]\n\
                     target = { filter = { family = \"butterworth\", order = 3, cutoff = 0.3 } }";
-        Model::new(&Spec::from_toml(text, "spec.toml").unwrap()).unwrap()
+        ChannelModel::new(&Spec::from_toml(text, "spec.toml").unwrap()).unwrap()
     }
 
     /// By the definition: the column of the channels in the order, less the phases that were removed.
     #[test]
     fn an_order_leaves_what_the_projection_onto_its_column_leaves() {
         let model = model();
-        let point = Point::nominal(&model, Fit::default(), 0);
+        let point = ChannelValues::nominal(&model, FittedValues::default(), 0);
         let (w, order) = (0.7, [2, 0, 1]);
         let u = CMat::from_fn(3, 1, |i, _| Complex::new(1.0 + i as f64, 0.3 - i as f64));
-        let band = Band { w, count: 5, matrix: &u * u.adjoint() };
+        let band = SpectralBand { w, count: 5, matrix: &u * u.adjoint() };
         let delays = &model.delays;
         let left = |alias: i32| {
             let column = model.steering(&point, w, &[alias]);

@@ -35,7 +35,7 @@ pub(in crate::calibrate) struct Spectra {
 }
 
 /// The mean spectral matrix of neighbouring frequencies.
-pub(in crate::calibrate) struct Band {
+pub(in crate::calibrate) struct SpectralBand {
     /// W at the centre, rad per slow period.
     pub(in crate::calibrate) w: f64,
     /// Bins.
@@ -71,7 +71,7 @@ impl Spectra {
     }
 
     /// The spectral matrices with the phases of `delays` removed.
-    pub(in crate::calibrate) fn bands(&self, delays: &[f64]) -> Vec<Band> {
+    pub(in crate::calibrate) fn bands(&self, delays: &[f64]) -> Vec<SpectralBand> {
         let end = self.frames.div_ceil(2).saturating_sub(FIRST_BIN);
         let all = end.saturating_sub(FIRST_BIN);
         let count = (all / BINS_PER_BAND).clamp(1, MOST_BANDS);
@@ -79,7 +79,7 @@ impl Spectra {
         (0..count).map(|b| self.band(edge(b), edge(b + 1), delays)).collect()
     }
 
-    fn band(&self, first: usize, end: usize, delays: &[f64]) -> Band {
+    fn band(&self, first: usize, end: usize, delays: &[f64]) -> SpectralBand {
         let n = self.bins.len();
         let mut matrix = CMat::zeros(n, n);
         let mut column = vec![Complex::ZERO; n];
@@ -97,11 +97,11 @@ impl Spectra {
         }
         let count = end - first;
         let w = 0.5 * (first + end).saturating_sub(1) as f64 * step;
-        Band { w, count, matrix: matrix / Complex::from(count.max(1) as f64) }
+        SpectralBand { w, count, matrix: matrix / Complex::from(count.max(1) as f64) }
     }
 }
 
-impl Band {
+impl SpectralBand {
     /// The power of all channels in all bins.
     pub(in crate::calibrate) fn power(&self) -> f64 {
         self.count as f64 * self.matrix.trace().re
@@ -124,8 +124,8 @@ impl Band {
 /// The number of occupied aliases of each band: eigenvalues above the noise and above `least` times the
 /// largest. A band in which all N eigenvalues count is of no use, and so is one in which none does: 0 for
 /// both.
-pub(super) fn occupied(bands: &[Band], least: f64) -> Vec<usize> {
-    let values: Vec<Vec<f64>> = bands.iter().map(Band::eigenvalues).collect();
+pub(super) fn occupied(bands: &[SpectralBand], least: f64) -> Vec<usize> {
+    let values: Vec<Vec<f64>> = bands.iter().map(SpectralBand::eigenvalues).collect();
     let mut noise: Vec<f64> = values.iter().filter_map(|values| values.last().copied()).collect();
     noise.sort_by(f64::total_cmp);
     let floor = noise.get(noise.len() / 4).copied().unwrap_or(0.0).max(0.0);

@@ -1,15 +1,19 @@
 //! Blind fits of band-limited noise: coverage, efficiency, and what is refused.
 
 use crate::calibrate::testbench::{assert_covers, gaussian, trials};
-use crate::calibrate::{CalibrateError, Calibration, CalibrationSignal, Fit, Record, Settings, calibrate};
+use crate::calibrate::{
+    CalibrateError, Calibration, CalibrationSettings, CalibrationSignal, FittedValues, Record, calibrate,
+};
 use crate::random::Random;
-use crate::simulate::{Instants, Recording};
+use crate::simulate::{Instants, Periodic};
 use crate::spec::Spec;
 use crate::units::FastPeriods;
 use std::f64::consts::PI;
 
-const BLIND: Settings =
-    Settings { fit: Fit { delay: true, gain: true, offset: true, cutoff: None }, reference: 0 };
+const BLIND: CalibrationSettings = CalibrationSettings {
+    fit: FittedValues { delay: true, gain: true, offset: true, cutoff: None },
+    reference: 0,
+};
 
 fn spec(ratio: usize, delays: &[f64]) -> Spec {
     let channels: String = delays.iter().map(|d| format!("[[channel]]\ndelay = {d:?}\n")).collect();
@@ -36,7 +40,7 @@ fn band_limited(samples: usize, band: f64, dice: &mut Random) -> Vec<f64> {
 
 /// The captures of `truth`, with noise relative to the signal.
 fn captures(truth: &Spec, signal: &[f64], frames: usize, noise: f64, dice: &mut Random) -> Vec<Record> {
-    let recording = Recording::new(signal, FastPeriods(1.0));
+    let recording = Periodic::new(signal, FastPeriods(1.0));
     let one = |channel: &crate::spec::ChannelSpec| {
         let filter = crate::analog::StrictlyProper::new(&channel.filter, truth.fast_period).unwrap();
         // From the middle of the periodic signal, so that the record itself is not periodic.

@@ -1,8 +1,8 @@
 //! What the phases of tones leave open: the Nyquist zone of a tone, and whole periods of a delay.
 
-use super::phasors::Measured;
+use super::phasors::TonePhasors;
 use crate::calibrate::error::CalibrateError;
-use crate::calibrate::model::Model;
+use crate::calibrate::model::ChannelModel;
 use crate::sine_fit::wrapped;
 use crate::units::FastPeriods;
 use std::f64::consts::TAU;
@@ -22,7 +22,7 @@ const CLEARLY_BETTER: f64 = 0.05;
 
 /// Where the captures show a tone.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Alias {
+pub(super) struct ObservedTone {
     /// Cycles per slow sample: 0 to 1/2, of complex samples -1/2 to 1/2.
     pub(super) cycles: f64,
     pub(super) is_complex: bool,
@@ -30,35 +30,35 @@ pub(super) struct Alias {
 
 /// A frequency that a tone may have.
 #[derive(Debug, Clone, Copy)]
-struct Candidate {
+struct AliasCandidate {
     /// Cycles per slow sample.
     cycles: f64,
     /// Whether the captures show the conjugate: real samples do in odd zones (from 0).
     is_conjugate: bool,
 }
 
-impl Alias {
+impl ObservedTone {
     /// The frequencies with this alias in a Nyquist zone (from 0) of the fast rate.
-    fn candidates(self, ratio: usize, fast_zone: usize) -> Vec<Candidate> {
+    fn candidates(self, ratio: usize, fast_zone: usize) -> Vec<AliasCandidate> {
         let (alias, zones) = (self.cycles, ratio * fast_zone..ratio * (fast_zone + 1));
         if self.is_complex {
             let (least, most) = (0.5 * zones.start as f64, 0.5 * zones.end as f64);
             let wholes = -(zones.end as i64)..=zones.end as i64;
             let inside =
                 wholes.map(|whole| whole as f64 + alias).filter(|x| (least..most).contains(&x.abs()));
-            return inside.map(|cycles| Candidate { cycles, is_conjugate: false }).collect();
+            return inside.map(|cycles| AliasCandidate { cycles, is_conjugate: false }).collect();
         }
         let of_zone = |zone: usize| match zone % 2 {
-            1 => Candidate { cycles: zone.div_ceil(2) as f64 - alias, is_conjugate: true },
-            _ => Candidate { cycles: (zone / 2) as f64 + alias, is_conjugate: false },
+            1 => AliasCandidate { cycles: zone.div_ceil(2) as f64 - alias, is_conjugate: true },
+            _ => AliasCandidate { cycles: (zone / 2) as f64 + alias, is_conjugate: false },
         };
         zones.map(of_zone).collect()
     }
 }
 
-impl Candidate {
+impl AliasCandidate {
     /// How far measured phases are from the nominal ones (radians, rms).
-    fn distance(self, model: &Model, phases: &[f64], reference: usize) -> f64 {
+    fn distance(self, model: &ChannelModel, phases: &[f64], reference: usize) -> f64 {
         let w = TAU * self.cycles / model.ratio as f64;
         let off = |i: usize| {
             let measured = phases[i] - phases[reference];
@@ -73,8 +73,8 @@ impl Candidate {
 /// The frequency, in cycles per slow sample, of a tone that appears at `alias` with `phases`: the one in the
 /// signal's zone of the fast rate whose nominal phases agree.
 pub(super) fn zone_of(
-    model: &Model,
-    alias: Alias,
+    model: &ChannelModel,
+    alias: ObservedTone,
     phases: &[f64],
     reference: usize,
 ) -> Result<f64, CalibrateError> {
@@ -95,12 +95,12 @@ pub(super) fn zone_of(
 }
 
 /// The tone of the highest frequency.
-fn highest<'a>(tones: &[&'a Measured]) -> Option<&'a Measured> {
+fn highest<'a>(tones: &[&'a TonePhasors]) -> Option<&'a TonePhasors> {
     tones.iter().copied().max_by(|a, b| a.w.total_cmp(&b.w))
 }
 
 /// The least change of a delay that leaves all phases as they are.
-pub(super) fn modulus(tones: &[&Measured]) -> Option<FastPeriods> {
+pub(super) fn modulus(tones: &[&TonePhasors]) -> Option<FastPeriods> {
     let period = TAU / highest(tones)?.w;
     let agrees = |shift: &f64| tones.iter().all(|tone| wrapped(tone.w * shift).abs() < SAME_PHASE);
     (1..=MOST_PERIODS).map(|m| m as f64 * period).find(agrees).map(FastPeriods)
@@ -108,7 +108,7 @@ pub(super) fn modulus(tones: &[&Measured]) -> Option<FastPeriods> {
 
 /// The deviation of the delay of channel `i` from nominal, roughly: among those within `reach` fast periods
 /// the one nearest to 0 that agrees with the phases of all tones about as well as the best.
-pub(super) fn nearest_delay(tones: &[&Measured], i: usize, reach: f64) -> f64 {
+pub(super) fn nearest_delay(tones: &[&TonePhasors], i: usize, reach: f64) -> f64 {
     let Some(top) = highest(tones) else { return 0.0 };
     let (first, period) = (-top.ratios[i].arg() / top.w, TAU / top.w);
     let most = if tones.len() == 1 { 0 } else { ((reach / period) as i64).min(MOST_PERIODS as i64) };

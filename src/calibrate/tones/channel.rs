@@ -1,10 +1,10 @@
 //! The values of one channel from the ratios of its tones.
 
-use super::phasors::Measured;
+use super::phasors::TonePhasors;
 use crate::calibrate::error::CalibrateError;
 use crate::calibrate::estimates::WORST_CONDITION;
-use crate::calibrate::fit::{Fit, Kind};
-use crate::calibrate::model::Model;
+use crate::calibrate::fit::{ChannelParameter, FittedValues};
+use crate::calibrate::model::ChannelModel;
 use crate::linalg::least_squares::{LeastSquares, NoMinimum, NormalEquations, StepLimits, minimise};
 use crate::linalg::{Complex, Mat};
 
@@ -16,7 +16,7 @@ const SMALL_STEP: f64 = 1e-6;
 const RESPONSE_ROUNDING: f64 = 1e-12;
 
 /// One tone in the channel.
-struct Row {
+struct ToneEquation {
     /// Rad per fast period.
     w: f64,
     /// ln of the ratio, its phase without whole cycles of the nearest delay.
@@ -26,19 +26,19 @@ struct Row {
 }
 
 /// The equations of a channel at the present values.
-pub(super) struct ChannelFit<'a> {
-    model: &'a Model,
+pub(super) struct RatioFit<'a> {
+    model: &'a ChannelModel,
     /// From 0.
     channel: usize,
-    fit: Fit,
-    kinds: Vec<Kind>,
-    rows: Vec<Row>,
+    fit: FittedValues,
+    kinds: Vec<ChannelParameter>,
+    rows: Vec<ToneEquation>,
     /// In the order of `kinds`.
     values: Vec<f64>,
 }
 
-/// The values in the order of [`Fit::kinds`].
-pub(super) struct Solution {
+/// The values in the order of [`FittedValues::kinds`].
+pub(super) struct ChannelSolution {
     pub(super) values: Vec<f64>,
     pub(super) covariance: Mat,
     /// Chi squared, and its degrees of freedom.
@@ -46,7 +46,7 @@ pub(super) struct Solution {
     pub(super) freedom: usize,
 }
 
-impl LeastSquares for ChannelFit<'_> {
+impl LeastSquares for RatioFit<'_> {
     type Error = CalibrateError;
     /// The equations are linear in all values but the cut-off, which takes three to eight steps.
     const MOST_STEPS: usize = 40;
@@ -59,14 +59,14 @@ impl LeastSquares for ChannelFit<'_> {
         let (magnitudes, phases) = (self.fit.gain || with_cutoff, self.fit.delay || with_cutoff);
         for row in &self.rows {
             let response = |ln_cutoff| self.model.response(self.channel, row.w, ln_cutoff);
-            let effect = |&kind: &Kind| match kind {
-                Kind::Delay => Complex::new(0.0, -row.w),
-                Kind::Gain => Complex::ONE,
-                Kind::Cutoff => self.model.cutoff_slope(self.channel, row.w, ln_cutoff),
+            let effect = |&kind: &ChannelParameter| match kind {
+                ChannelParameter::Delay => Complex::new(0.0, -row.w),
+                ChannelParameter::Gain => Complex::ONE,
+                ChannelParameter::Cutoff => self.model.cutoff_slope(self.channel, row.w, ln_cutoff),
             };
             let effects: Vec<Complex<f64>> = self.kinds.iter().map(effect).collect();
             let values = self.kinds.iter().zip(&effects).zip(&self.values);
-            let linear = values.filter(|((kind, _), _)| **kind != Kind::Cutoff);
+            let linear = values.filter(|((kind, _), _)| **kind != ChannelParameter::Cutoff);
             let explained = linear.map(|((_, effect), value)| effect * *value).sum::<Complex<f64>>()
                 + (response(ln_cutoff) / response(0.0)).ln();
             let left = row.ln_ratio - explained;
@@ -92,7 +92,7 @@ impl LeastSquares for ChannelFit<'_> {
 
     /// A cut-off that moves by more than a factor of e is refused anyway.
     fn limits(&self, k: usize, sigma: f64) -> StepLimits {
-        let largest = if self.kinds[k] == Kind::Cutoff { 1.0 } else { f64::INFINITY };
+        let largest = if self.kinds[k] == ChannelParameter::Cutoff { 1.0 } else { f64::INFINITY };
         StepLimits { largest, negligible: (SMALL_STEP * sigma).max(RESPONSE_ROUNDING) }
     }
 
@@ -101,22 +101,32 @@ impl LeastSquares for ChannelFit<'_> {
     }
 }
 
-impl<'a> ChannelFit<'a> {
+impl<'a> RatioFit<'a> {
     /// Of the tones in a channel whose delay is near `delay` after its nominal one.
-    pub(super) fn new(model: &'a Model, channel: usize, fit: Fit, tones: &[&Measured], delay: f64) -> Self {
-        let row = |tone: &&Measured| {
+    pub(super) fn new(
+        model: &'a ChannelModel,
+        channel: usize,
+        fit: FittedValues,
+        tones: &[&TonePhasors],
+        delay: f64,
+    ) -> Self {
+        let row = |tone: &&TonePhasors| {
             let (ratio, phase) = (tone.ratios[channel], tone.w * delay);
             // Whole cycles of the delay are taken out before the angle is measured.
             let angle = (ratio * Complex::from_polar(1.0, phase)).arg() - phase;
-            Row { w: tone.w, ln_ratio: Complex::new(ratio.norm().ln(), angle), sigmas: tone.sigmas[channel] }
+            ToneEquation {
+                w: tone.w,
+                ln_ratio: Complex::new(ratio.norm().ln(), angle),
+                sigmas: tone.sigmas[channel],
+            }
         };
         let (kinds, rows) = (fit.kinds(), tones.iter().map(row).collect());
         Self { model, channel, fit, values: vec![0.0; kinds.len()], kinds, rows }
     }
 
-    pub(super) fn solve(mut self) -> Result<Solution, CalibrateError> {
+    pub(super) fn solve(mut self) -> Result<ChannelSolution, CalibrateError> {
         if self.kinds.is_empty() {
-            return Ok(Solution {
+            return Ok(ChannelSolution {
                 values: self.values,
                 covariance: Mat::zeros(0, 0),
                 squares: 0.0,
@@ -124,18 +134,18 @@ impl<'a> ChannelFit<'a> {
             });
         }
         let found = minimise(&mut self)?;
-        let sigma = self.kinds.iter().position(|&kind| kind == Kind::Cutoff);
+        let sigma = self.kinds.iter().position(|&kind| kind == ChannelParameter::Cutoff);
         let sigma = sigma.map_or(0.0, |k| found.inverse[(k, k)].sqrt());
         if sigma > LARGEST_CUTOFF_ERROR || self.ln_cutoff().abs() > 1.0 {
             return Err(CalibrateError::CutoffLooksLikeDelay { channel: self.channel + 1, sigma });
         }
         let (squares, rows) = (found.equations.squares, found.equations.rows);
         let freedom = rows.saturating_sub(self.values.len());
-        Ok(Solution { values: self.values, covariance: found.inverse, squares, freedom })
+        Ok(ChannelSolution { values: self.values, covariance: found.inverse, squares, freedom })
     }
 
     fn ln_cutoff(&self) -> f64 {
-        let at = self.kinds.iter().position(|&kind| kind == Kind::Cutoff);
+        let at = self.kinds.iter().position(|&kind| kind == ChannelParameter::Cutoff);
         at.map_or(0.0, |k| self.values[k])
     }
 }

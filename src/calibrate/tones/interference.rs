@@ -1,9 +1,9 @@
 //! Tones whose intervals would be too short: harmonics on the tone, and quantisation that repeats with it.
 
-use super::phasors::{Captures, Measured};
-use crate::calibrate::warning::Warning;
+use super::phasors::{TonePhasors, ToneRecords};
+use crate::calibrate::warning::CalibrationWarning;
 use crate::linalg::Complex;
-use crate::sine_fit::{Direction, SineFit, alias};
+use crate::sine_fit::{Sense, SineFit, alias};
 
 /// Harmonics that are looked at.
 const HARMONICS: std::ops::RangeInclusive<usize> = 2..=10;
@@ -26,11 +26,14 @@ pub(super) fn is_harmonic(cycles: f64, fundamental: f64, frames: usize) -> bool 
 }
 
 /// Harmonics that fall onto the tone, and few phases.
-pub(super) fn warnings(tone: &Measured, frames: usize) -> impl Iterator<Item = Warning> + use<> {
+pub(super) fn warnings(
+    tone: &TonePhasors,
+    frames: usize,
+) -> impl Iterator<Item = CalibrationWarning> + use<> {
     let harmonic = harmonic_at(tone.cycles, tone.cycles, frames);
-    let harmonic = harmonic.map(|order| Warning::HarmonicOnTone { tone: tone.frequency, order });
+    let harmonic = harmonic.map(|order| CalibrationWarning::HarmonicOnTone { tone: tone.frequency, order });
     let few = repeats_after(&[tone.cycles], frames).filter(|&phases| phases <= FEW_PHASES);
-    let few = few.map(|phases| Warning::FewPhases { tone: tone.frequency, phases });
+    let few = few.map(|phases| CalibrationWarning::FewPhases { tone: tone.frequency, phases });
     harmonic.into_iter().chain(few)
 }
 
@@ -45,12 +48,12 @@ fn repeats_after(cycles: &[f64], frames: usize) -> Option<usize> {
 /// What the residual repeats also hides in tones and constants. A pattern of q values of variance u^2 adds
 /// u^2 / q to the variance of the constant, which is given here for each part of the records, and twice that
 /// to the variance of each part of an amplitude.
-pub(super) fn repeating_variances(sines: &SineFit, captures: &Captures<'_>) -> Vec<f64> {
+pub(super) fn repeating_variances(sines: &SineFit, captures: &ToneRecords<'_>) -> Vec<f64> {
     let cycles: Vec<f64> = sines.frequencies.iter().map(|f| f.value / sines.rate).collect();
     let fitted = 1 + 2 * cycles.len();
     let phases = repeats_after(&cycles, captures.frames()).filter(|&phases| phases > fitted);
     let Some(phases) = phases else { return vec![0.0; sines.channels.len()] };
-    let pattern = Pattern { phases, fitted };
+    let pattern = RepeatingPattern { phases, fitted };
     let samples = captures.records.iter().flat_map(|one| one.parts().map(move |part| (part, &one.keep)));
     let of_part = |(part, (samples, keep)): (usize, (&[f64], &Vec<bool>))| {
         let residual = sines.residual(part, samples);
@@ -62,10 +65,10 @@ pub(super) fn repeating_variances(sines: &SineFit, captures: &Captures<'_>) -> V
 /// Widens the errors of tone `t` by what the parts of the records repeat. An exponential has a quarter of
 /// the variance of the real and of the imaginary part.
 pub(super) fn widen_repeating(
-    tone: &mut Measured,
+    tone: &mut TonePhasors,
     t: usize,
     sines: &SineFit,
-    captures: &Captures<'_>,
+    captures: &ToneRecords<'_>,
     reference: usize,
     repeating: &[f64],
 ) {
@@ -73,13 +76,13 @@ pub(super) fn widen_repeating(
         let parts = captures.parts_of(converter);
         let share = 1.0 / parts.len().pow(2) as f64;
         let first = captures.records_of(converter).start;
-        let amplitude = captures.tone(sines, first, t, Direction::Forward).amplitude.value;
+        let amplitude = captures.tone(sines, first, t, Sense::Forward).amplitude.value;
         2.0 * share * repeating[parts].iter().sum::<f64>() / amplitude.powi(2)
     });
 }
 
 /// Adds a relative variance of each channel's phasor, with that of the reference, to the errors.
-fn widen(tone: &mut Measured, reference: usize, variance: impl Fn(usize) -> f64) {
+fn widen(tone: &mut TonePhasors, reference: usize, variance: impl Fn(usize) -> f64) {
     let added: Vec<f64> = (0..tone.sigmas.len()).map(variance).collect();
     for (sigmas, own) in tone.sigmas.iter_mut().zip(&added) {
         let more = (own + added[reference]).sqrt();
@@ -89,12 +92,12 @@ fn widen(tone: &mut Measured, reference: usize, variance: impl Fn(usize) -> f64)
 
 /// What the samples repeat: as many values as there are phases, of which a fit takes so many out.
 #[derive(Debug, Clone, Copy)]
-struct Pattern {
+struct RepeatingPattern {
     phases: usize,
     fitted: usize,
 }
 
-impl Pattern {
+impl RepeatingPattern {
     /// The variance of what repeats, beyond that of noise of standard deviation `noise`.
     fn variance(self, residual: &[f64], keep: &[bool], noise: f64) -> f64 {
         let Self { phases, fitted } = self;

@@ -19,20 +19,20 @@ mod solution;
 #[cfg(test)]
 mod tests;
 
-use super::Settings;
+use super::CalibrationSettings;
 use super::error::CalibrateError;
-use super::estimates::{Fitted, Tone, contradiction};
-use super::model::Model;
+use super::estimates::{CalibrationTone, Fitted, contradiction};
+use super::model::ChannelModel;
 use super::order::{Distances, other_order};
 use super::record::Acquisition;
-use super::warning::Warning;
+use super::warning::CalibrationWarning;
 use crate::linalg::Complex;
-use crate::sine_fit::{self, ChannelFit as SineChannel, Direction, Estimate, alias};
+use crate::sine_fit::{self, ChannelFit as SineChannel, Estimate, Sense, alias};
 use crate::spec::Spec;
 use crate::units::{Decibels, Hertz};
-use ambiguity::{Alias, zone_of};
+use ambiguity::{ObservedTone, zone_of};
 use interference::{is_harmonic, repeating_variances, widen_repeating};
-use phasors::{Captures, Measured};
+use phasors::{TonePhasors, ToneRecords};
 use solution::{CUTOFF_TONES, distinct, explained, outlying, solve};
 
 /// Most tones that are looked for, and how far below the largest.
@@ -48,17 +48,17 @@ const LEAST_CYCLES: f64 = 1.0;
 /// Calibrates from tones near `given`, or from those that are found. Of several acquisitions each holds at
 /// least one of the tones.
 pub(super) fn fit(
-    model: &Model,
+    model: &ChannelModel,
     spec: &Spec,
     acquisitions: &[Acquisition<'_>],
     given: &[Hertz],
-    settings: Settings,
+    settings: CalibrationSettings,
 ) -> Result<Fitted, CalibrateError> {
     let layout = spec.layout();
     // Of converters of one rate it is the same model.
-    let of_frames = if layout.is_plain() { model.clone() } else { Model::new(&spec.per_sample())? };
+    let of_frames = if layout.is_plain() { model.clone() } else { ChannelModel::new(&spec.per_sample())? };
     let measure = |one: &Acquisition<'_>| {
-        let captures = Captures::new(one.records, &layout);
+        let captures = ToneRecords::new(one.records, &layout);
         let held = held(model, &captures, given, acquisitions.len() > 1)?;
         Tones::measure(model, &of_frames, &captures, &held, settings.reference)
     };
@@ -73,7 +73,7 @@ pub(super) fn fit(
     if settings.fit.cutoff.is_some() && distinct < CUTOFF_TONES {
         return Err(CalibrateError::TooFewTones { tones: distinct });
     }
-    let mut warnings: Vec<Warning> = Vec::new();
+    let mut warnings: Vec<CalibrationWarning> = Vec::new();
     for warning in all.iter().flat_map(|tones| &tones.warnings) {
         if !warnings.contains(warning) {
             warnings.push(warning.clone());
@@ -81,7 +81,7 @@ pub(super) fn fit(
     }
     let names: Vec<&str> = acquisitions.iter().map(|one| one.name).collect();
     let mut fitted = solve(model, &all, settings, &mut warnings)?;
-    if fitted.warnings.iter().any(|warning| matches!(warning, Warning::TonesDisagree { .. })) {
+    if fitted.warnings.iter().any(|warning| matches!(warning, CalibrationWarning::TonesDisagree { .. })) {
         let outlying = outlying(model, &all, &names, settings);
         let reason =
             if outlying.is_empty() { explained(model, spec, &all, settings, &mut fitted) } else { None };
@@ -100,21 +100,21 @@ struct Tones {
     frames: usize,
     /// Those of the given ones that it holds.
     given: Vec<Hertz>,
-    tones: Vec<Tone>,
-    measured: Vec<Measured>,
+    tones: Vec<CalibrationTone>,
+    measured: Vec<TonePhasors>,
     /// The constant of each part of each converter.
     constants: Vec<Estimate<f64>>,
     is_complex: bool,
-    warnings: Vec<Warning>,
+    warnings: Vec<CalibrationWarning>,
 }
 
 impl Tones {
     /// Of tones near `given`, or of those that are found.
     /// `of_frames` is the model of the records, one for each sample of a frame.
     fn measure(
-        model: &Model,
-        of_frames: &Model,
-        captures: &Captures<'_>,
+        model: &ChannelModel,
+        of_frames: &ChannelModel,
+        captures: &ToneRecords<'_>,
         given: &[Hertz],
         reference: usize,
     ) -> Result<Self, CalibrateError> {
@@ -127,12 +127,12 @@ impl Tones {
             _ => (located(captures, rate, given)?, (0..given.len()).collect()),
         };
         let sines = sine_fit::fit(&channels, rate, &starts)?;
-        let is_image = |&t: &usize| captures.direction(&sines, t) == Direction::Backward;
+        let is_image = |&t: &usize| captures.direction(&sines, t) == Sense::Backward;
         if let Some(t) = (0..sines.tones()).find(is_image) {
             return Err(CalibrateError::OtherSign { tone: sines.frequencies[t].value });
         }
         let measure = |&t: &usize| captures.measured(model, &sines, t, reference);
-        let mut measured: Vec<Measured> = used.iter().map(measure).collect();
+        let mut measured: Vec<TonePhasors> = used.iter().map(measure).collect();
         let repeating = repeating_variances(&sines, captures);
         for (tone, &t) in measured.iter_mut().zip(&used) {
             warnings.extend(interference::warnings(tone, captures.frames()));
@@ -143,10 +143,10 @@ impl Tones {
             let Estimate { value, sigma } = channel.constant;
             Estimate { value, sigma: sigma.hypot(repeating.sqrt()) }
         };
-        let tone = |&t: &usize| Tone {
+        let tone = |&t: &usize| CalibrationTone {
             frequency: sines.frequencies[t],
             zone: (2.0 * (sines.frequencies[t].value / rate).abs()).floor() as usize + 1,
-            amplitude: captures.tone(&sines, first, t, Direction::Forward).amplitude,
+            amplitude: captures.tone(&sines, first, t, Sense::Forward).amplitude,
         };
         Ok(Self {
             frames: captures.frames(),
@@ -164,8 +164,8 @@ impl Tones {
 /// The given tones that an acquisition holds: all of them, unless it is one of several. Then those are there
 /// whose alias is among the lines.
 fn held(
-    model: &Model,
-    captures: &Captures<'_>,
+    model: &ChannelModel,
+    captures: &ToneRecords<'_>,
     given: &[Hertz],
     is_one_of_several: bool,
 ) -> Result<Vec<Hertz>, CalibrateError> {
@@ -186,7 +186,7 @@ fn held(
     if held.is_empty() { Err(CalibrateError::NoneOfTheTones { lines }) } else { Ok(held) }
 }
 
-impl Captures<'_> {
+impl ToneRecords<'_> {
     /// The constant of each part of each converter, from those of the parts of all records.
     fn constants(&self, of_records: &[Estimate<f64>]) -> Vec<Estimate<f64>> {
         let parts = self.parts(0).len();
@@ -206,7 +206,7 @@ fn add_offsets(fitted: &mut Fitted, all: &[Tones]) {
     if all.iter().all(|tones| tones.is_complex) {
         let values: Vec<f64> = constants.iter().map(|constant| constant.value).collect();
         let offsets = values.chunks(2).map(<[f64]>::to_vec).collect();
-        fitted.warnings.push(Warning::ComplexOffsets { offsets });
+        fitted.warnings.push(CalibrationWarning::ComplexOffsets { offsets });
     } else {
         fitted.offsets = Some(constants);
     }
@@ -228,7 +228,7 @@ fn mean(all: impl Iterator<Item = Estimate<f64>> + Clone) -> Estimate<f64> {
 }
 
 /// Starts of a fit near given frequencies.
-fn located(captures: &Captures<'_>, rate: Hertz, given: &[Hertz]) -> Result<Vec<Hertz>, CalibrateError> {
+fn located(captures: &ToneRecords<'_>, rate: Hertz, given: &[Hertz]) -> Result<Vec<Hertz>, CalibrateError> {
     let (channels, frames) = (captures.channels(), captures.frames());
     let near = |&tone: &Hertz| {
         check_position(tone, rate, frames)?;
@@ -253,36 +253,36 @@ fn check_position(tone: Hertz, rate: Hertz, frames: usize) -> Result<(), Calibra
 
 /// The tones in the captures, in their zones, and which of them tell something of the delays.
 fn found(
-    model: &Model,
-    captures: &Captures<'_>,
+    model: &ChannelModel,
+    captures: &ToneRecords<'_>,
     reference: usize,
-    warnings: &mut Vec<Warning>,
+    warnings: &mut Vec<CalibrationWarning>,
 ) -> Result<(Vec<Hertz>, Vec<usize>), CalibrateError> {
     let (rate, channels, frames) = (model.slow_rate(), captures.channels(), captures.frames());
     let aliases = sine_fit::find_tones(&channels, rate, MOST_TONES, TONE_RANGE)?;
     let sines = sine_fit::fit(&channels, rate, &aliases)?;
-    let directions: Vec<Direction> = (0..sines.tones()).map(|t| captures.direction(&sines, t)).collect();
+    let directions: Vec<Sense> = (0..sines.tones()).map(|t| captures.direction(&sines, t)).collect();
     let signed = sines.frequencies.iter().zip(&directions);
     let cycles: Vec<f64> = signed.map(|(f, direction)| direction.sign() * (f.value / rate)).collect();
     let is_own = |&k: &usize| !(0..k).any(|j| is_harmonic(cycles[k], cycles[j], frames));
     let used: Vec<usize> = (0..cycles.len()).filter(is_own).collect();
     if used.len() < cycles.len() {
-        warnings.push(Warning::HarmonicsLeftOut { count: cycles.len() - used.len() });
+        warnings.push(CalibrationWarning::HarmonicsLeftOut { count: cycles.len() - used.len() });
     }
     let mut starts: Vec<Hertz> = cycles.iter().map(|&cycles| rate * cycles).collect();
     for &t in &used {
         check_position(starts[t], rate, frames)?;
         let phase = |i| captures.tone(&sines, i, t, directions[t]).phase.value.0;
         let phases: Vec<f64> = (0..model.channels()).map(phase).collect();
-        let alias = Alias { cycles: cycles[t], is_complex: captures.is_complex };
+        let alias = ObservedTone { cycles: cycles[t], is_complex: captures.is_complex };
         starts[t] = rate * zone_of(model, alias, &phases, reference)?;
     }
     Ok((starts, used))
 }
 
 /// Refuses captures whose phases are those of the channels in another order.
-fn check_order(model: &Model, tones: &[Measured], reference: usize) -> Result<(), CalibrateError> {
-    let rms = |phase: &dyn Fn(&Measured) -> Complex<f64>| {
+fn check_order(model: &ChannelModel, tones: &[TonePhasors], reference: usize) -> Result<(), CalibrateError> {
+    let rms = |phase: &dyn Fn(&TonePhasors) -> Complex<f64>| {
         let squares: f64 = tones.iter().map(|tone| phase(tone).arg().powi(2)).sum();
         (squares / tones.len() as f64).sqrt()
     };

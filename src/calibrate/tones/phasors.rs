@@ -3,17 +3,17 @@
 //! The front ends are real, so the conjugate of an exponential at -f has passed them like one at +f.
 //! Phasors are those at +f for both signs, and what follows from them does not know of complex samples.
 
-use crate::calibrate::model::Model;
+use crate::calibrate::model::ChannelModel;
 use crate::calibrate::record::Record;
 use crate::linalg::Complex;
-use crate::sine_fit::{Channel, Component, Direction, SineFit, ToneFit};
+use crate::sine_fit::{Channel, Component, Sense, SineFit, ToneFit};
 use crate::spec::FrameLayout;
 use crate::units::Hertz;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// Records of real or of complex samples, one for each sample of a frame.
-pub(super) struct Captures<'a> {
+pub(super) struct ToneRecords<'a> {
     pub(super) records: &'a [Record],
     /// The records of each converter.
     converters: Vec<Range<usize>>,
@@ -21,7 +21,7 @@ pub(super) struct Captures<'a> {
 }
 
 /// What one tone says of the channels.
-pub(super) struct Measured {
+pub(super) struct TonePhasors {
     /// Rad per fast period.
     pub(super) w: f64,
     /// Cycles per slow sample.
@@ -33,7 +33,7 @@ pub(super) struct Measured {
     pub(super) sigmas: Vec<Complex<f64>>,
 }
 
-impl<'a> Captures<'a> {
+impl<'a> ToneRecords<'a> {
     pub(super) fn new(records: &'a [Record], layout: &FrameLayout) -> Self {
         let is_complex = records.iter().all(|record| record.imaginary.is_some());
         Self { records, converters: layout.ranges(), is_complex }
@@ -71,7 +71,7 @@ impl<'a> Captures<'a> {
         self.converters[converter].clone()
     }
 
-    fn component(&self, i: usize, direction: Direction) -> Component {
+    fn component(&self, i: usize, direction: Sense) -> Component {
         let first = self.parts(i).start;
         match self.is_complex {
             true => Component::Complex([first, first + 1], direction),
@@ -80,17 +80,23 @@ impl<'a> Captures<'a> {
     }
 
     /// Tone `t` of `sines` in record `i`: of complex records the exponential in `direction`.
-    pub(super) fn tone(&self, sines: &SineFit, i: usize, t: usize, direction: Direction) -> ToneFit {
+    pub(super) fn tone(&self, sines: &SineFit, i: usize, t: usize, direction: Sense) -> ToneFit {
         sines.phasor(self.component(i, direction), t)
     }
 
     /// The ratios of tone `t` to the reference converter, and their errors. Of a converter with several
     /// samples per frame the phasors are turned to the first one and averaged.
-    pub(super) fn measured(&self, model: &Model, sines: &SineFit, t: usize, reference: usize) -> Measured {
+    pub(super) fn measured(
+        &self,
+        model: &ChannelModel,
+        sines: &SineFit,
+        t: usize,
+        reference: usize,
+    ) -> TonePhasors {
         let frequency = sines.frequencies[t].value;
         let w = TAU * frequency.per_fast_period(model.fast_period).0.abs();
         let of_record = |i: usize| {
-            let tone = self.tone(sines, i, t, Direction::Forward);
+            let tone = self.tone(sines, i, t, Sense::Forward);
             let phasor = Complex::from_polar(tone.amplitude.value, tone.phase.value.0);
             if self.is_complex && frequency.0 < 0.0 { phasor.conj() } else { phasor }
         };
@@ -105,7 +111,7 @@ impl<'a> Captures<'a> {
         let ratio = |i: usize| phasor(i) / phasor(reference) / expected(i);
         let sigmas = |converter: usize| {
             let [i, r] = [converter, reference].map(|converter| self.records_of(converter).start);
-            let [own, other] = [i, r].map(|i| self.component(i, Direction::Forward));
+            let [own, other] = [i, r].map(|i| self.component(i, Sense::Forward));
             let ratio = sines.ratio(own, other, t);
             let phase = match self.is_complex {
                 true => ratio.phase.sigma.0,
@@ -116,7 +122,7 @@ impl<'a> Captures<'a> {
             // The noise of several records averages, the error of the frequency does not.
             let averaged = |converter: usize| {
                 let records = self.records_of(converter);
-                let amplitude = self.tone(sines, records.start, t, Direction::Forward).amplitude;
+                let amplitude = self.tone(sines, records.start, t, Sense::Forward).amplitude;
                 (amplitude.sigma / amplitude.value).powi(2) * (1.0 - 1.0 / records.len() as f64)
             };
             let less = averaged(converter) + averaged(reference);
@@ -128,18 +134,18 @@ impl<'a> Captures<'a> {
         };
         let all = 0..model.channels();
         let (ratios, sigmas) = (all.clone().map(ratio).collect(), all.map(sigmas).collect());
-        Measured { w, cycles: frequency / sines.rate, frequency, ratios, sigmas }
+        TonePhasors { w, cycles: frequency / sines.rate, frequency, ratios, sigmas }
     }
 
     /// The exponential that is the tone: the larger one over all records, forward for real samples.
-    pub(super) fn direction(&self, sines: &SineFit, t: usize) -> Direction {
+    pub(super) fn direction(&self, sines: &SineFit, t: usize) -> Sense {
         let power = |direction| -> f64 {
             let amplitude = |i| self.tone(sines, i, t, direction).amplitude.value;
             (0..self.records.len()).map(|i| amplitude(i).powi(2)).sum()
         };
-        match self.is_complex && power(Direction::Backward) > power(Direction::Forward) {
-            true => Direction::Backward,
-            false => Direction::Forward,
+        match self.is_complex && power(Sense::Backward) > power(Sense::Forward) {
+            true => Sense::Backward,
+            false => Sense::Forward,
         }
     }
 }

@@ -2,14 +2,14 @@
 
 use super::Tones;
 use super::ambiguity::{modulus, nearest_delay};
-use super::channel::{ChannelFit, Solution};
-use super::phasors::Measured;
-use crate::calibrate::Settings;
+use super::channel::{ChannelSolution, RatioFit};
+use super::phasors::TonePhasors;
+use crate::calibrate::CalibrationSettings;
 use crate::calibrate::error::CalibrateError;
 use crate::calibrate::estimates::Fitted;
-use crate::calibrate::fit::{Fit, Kind};
-use crate::calibrate::model::{Model, Point};
-use crate::calibrate::warning::Warning;
+use crate::calibrate::fit::{ChannelParameter, FittedValues};
+use crate::calibrate::model::{ChannelModel, ChannelValues};
+use crate::calibrate::warning::CalibrationWarning;
 use crate::linalg::Mat;
 use crate::spec::{Cutoff, Spec};
 use crate::units::FastPeriods;
@@ -30,15 +30,15 @@ const DOUBTFUL_SHARE: f64 = 0.25;
 
 /// Least squares over the tones of all acquisitions, channel by channel.
 pub(super) fn solve(
-    model: &Model,
+    model: &ChannelModel,
     all: &[Tones],
-    settings: Settings,
-    warnings: &mut Vec<Warning>,
+    settings: CalibrationSettings,
+    warnings: &mut Vec<CalibrationWarning>,
 ) -> Result<Fitted, CalibrateError> {
-    let Settings { fit, reference } = settings;
-    let tones: Vec<&Measured> = all.iter().flat_map(|tones| &tones.measured).collect();
+    let CalibrationSettings { fit, reference } = settings;
+    let tones: Vec<&TonePhasors> = all.iter().flat_map(|tones| &tones.measured).collect();
     let frames = all.iter().map(|tones| tones.frames).sum();
-    let point = Point::nominal(model, fit, reference);
+    let point = ChannelValues::nominal(model, fit, reference);
     let (count, parameters) = (fit.kinds().len(), point.parameters.len());
     let mut fitted = Fitted::new(point, Mat::zeros(parameters, parameters), frames);
     fitted.modulus = modulus(&tones);
@@ -48,7 +48,7 @@ pub(super) fn solve(
         if let Some(modulus) = fitted.modulus.filter(|_| fit.delay)
             && delay.abs() > DOUBTFUL_SHARE * modulus.0
         {
-            warnings.push(Warning::DelayModulo { channel: i + 1, modulus });
+            warnings.push(CalibrationWarning::DelayModulo { channel: i + 1, modulus });
         }
         let at = (k * count, k * count);
         fitted.covariance.view_mut(at, (count, count)).copy_from(&channels[k].covariance);
@@ -56,29 +56,29 @@ pub(super) fn solve(
     let values: Vec<f64> = channels.iter().flat_map(|channel| channel.values.iter().copied()).collect();
     fitted.point.advance(&values);
     if fit.delay && fit.cutoff.is_none() {
-        warnings.push(Warning::CutoffAssumed { delay: cutoff_effect(model, &tones, reference) });
+        warnings.push(CalibrationWarning::CutoffAssumed { delay: cutoff_effect(model, &tones, reference) });
     }
     let squares = channels.iter().map(|channel| channel.squares).sum();
     let misfit = fitted.widen(squares, channels.iter().map(|channel| channel.freedom).sum());
-    fitted.warnings.extend(misfit.map(|misfit| Warning::TonesDisagree { misfit }));
+    fitted.warnings.extend(misfit.map(|misfit| CalibrationWarning::TonesDisagree { misfit }));
     Ok(fitted)
 }
 
 /// The fits of all channels but the reference.
 fn solve_channels(
-    model: &Model,
-    tones: &[&Measured],
-    Settings { fit, reference }: Settings,
-) -> Result<Vec<Solution>, CalibrateError> {
+    model: &ChannelModel,
+    tones: &[&TonePhasors],
+    CalibrationSettings { fit, reference }: CalibrationSettings,
+) -> Result<Vec<ChannelSolution>, CalibrateError> {
     let solve = |i| {
         let delay = nearest_delay(tones, i, model.ratio as f64);
-        ChannelFit::new(model, i, fit, tones, delay).solve()
+        RatioFit::new(model, i, fit, tones, delay).solve()
     };
     model.others(reference).map(solve).collect()
 }
 
 /// Square root of chi squared per degree of freedom of all channels, if there are any.
-fn misfit(channels: &[Solution]) -> Option<f64> {
+fn misfit(channels: &[ChannelSolution]) -> Option<f64> {
     let squares: f64 = channels.iter().map(|channel| channel.squares).sum();
     let freedom: usize = channels.iter().map(|channel| channel.freedom).sum();
     (freedom > 0).then(|| (squares / freedom as f64).sqrt())
@@ -86,10 +86,15 @@ fn misfit(channels: &[Solution]) -> Option<f64> {
 
 /// The acquisitions without which the others agree: the one that explains most of the misfit of all, then
 /// among the others as long as at least [`OUTLYING_OF`] are left.
-pub(super) fn outlying(model: &Model, all: &[Tones], names: &[&str], settings: Settings) -> Vec<Warning> {
+pub(super) fn outlying(
+    model: &ChannelModel,
+    all: &[Tones],
+    names: &[&str],
+    settings: CalibrationSettings,
+) -> Vec<CalibrationWarning> {
     // Tones that no longer determine the values tell nothing of their agreement.
     let misfit_of = |list: &[usize]| {
-        let tones: Vec<&Measured> = list.iter().flat_map(|&k| &all[k].measured).collect();
+        let tones: Vec<&TonePhasors> = list.iter().flat_map(|&k| &all[k].measured).collect();
         misfit(&solve_channels(model, &tones, settings).ok()?)
     };
     let (mut left, mut warnings): (Vec<usize>, _) = ((0..all.len()).collect(), Vec::new());
@@ -102,7 +107,7 @@ pub(super) fn outlying(model: &Model, all: &[Tones], names: &[&str], settings: S
         let Some((k, others)) = best.filter(|(_, others)| misfit > EXPLAINED_RATIO * others.max(1.0)) else {
             break;
         };
-        warnings.push(Warning::Outlying { name: names[k].to_owned(), misfit, others });
+        warnings.push(CalibrationWarning::Outlying { name: names[k].to_owned(), misfit, others });
         left = without(k);
     }
     warnings
@@ -111,13 +116,13 @@ pub(super) fn outlying(model: &Model, all: &[Tones], names: &[&str], settings: S
 /// The part of the front ends whose cut-offs, if they were fitted too, would make the tones agree. The
 /// intervals are widened so that they reach to the values of that fit.
 pub(super) fn explained(
-    model: &Model,
+    model: &ChannelModel,
     spec: &Spec,
     all: &[Tones],
-    settings: Settings,
+    settings: CalibrationSettings,
     fitted: &mut Fitted,
-) -> Option<Warning> {
-    let tones: Vec<&Measured> = all.iter().flat_map(|tones| &tones.measured).collect();
+) -> Option<CalibrationWarning> {
+    let tones: Vec<&TonePhasors> = all.iter().flat_map(|tones| &tones.measured).collect();
     if distinct(tones.iter().copied()) < CUTOFF_TONES {
         return None;
     }
@@ -125,8 +130,9 @@ pub(super) fn explained(
     let parts = (0..stages).filter(|_| stages > 1).map(Cutoff::Stage).chain([Cutoff::Whole]);
     // A part that cannot be fitted explains nothing.
     let candidate = |part: Cutoff| {
-        let fit = Fit { cutoff: Some(part), ..settings.fit };
-        let channels = solve_channels(&model.scaling(part, spec).ok()?, &tones, Settings { fit, ..settings });
+        let fit = FittedValues { cutoff: Some(part), ..settings.fit };
+        let channels =
+            solve_channels(&model.scaling(part, spec).ok()?, &tones, CalibrationSettings { fit, ..settings });
         let channels = channels.ok()?;
         Some((fit, misfit(&channels)?, channels))
     };
@@ -140,16 +146,16 @@ pub(super) fn explained(
         for (kind, own) in settings.fit.kinds().into_iter().zip(own.values) {
             let other = fit.kinds().into_iter().zip(&other.values).find(|(other, _)| *other == kind);
             // Factors of different filters do not compare.
-            if let Some((_, other)) = other.filter(|_| kind != Kind::Cutoff) {
+            if let Some((_, other)) = other.filter(|_| kind != ChannelParameter::Cutoff) {
                 fitted.reach(i, kind, other - own);
             }
         }
     }
-    Some(Warning::CutoffExplains { fit, misfit })
+    Some(CalibrationWarning::CutoffExplains { fit, misfit })
 }
 
 /// The largest change of a delay per per cent of cut-off: the mean of Im(s_it) / w_t over the tones.
-fn cutoff_effect(model: &Model, tones: &[&Measured], reference: usize) -> FastPeriods {
+fn cutoff_effect(model: &ChannelModel, tones: &[&TonePhasors], reference: usize) -> FastPeriods {
     let of = |i: usize| {
         let sum: f64 = tones.iter().map(|tone| model.cutoff_slope(i, tone.w, 0.0).im / tone.w).sum();
         0.01 * (sum / tones.len() as f64).abs()
@@ -158,7 +164,7 @@ fn cutoff_effect(model: &Model, tones: &[&Measured], reference: usize) -> FastPe
 }
 
 /// Number of different frequencies.
-pub(super) fn distinct<'a>(tones: impl Iterator<Item = &'a Measured>) -> usize {
+pub(super) fn distinct<'a>(tones: impl Iterator<Item = &'a TonePhasors>) -> usize {
     let mut all: Vec<f64> = tones.map(|tone| tone.frequency.0).collect();
     all.sort_by(f64::total_cmp);
     all.dedup_by(|a, b| (*a - *b).abs() < SAME_FREQUENCY * b.abs());

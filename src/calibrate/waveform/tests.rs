@@ -6,7 +6,7 @@ use crate::calibrate::Cutoff;
 use crate::calibrate::testbench::{
     assert_covers, errors, gaussian, interleaved, random_errors, trials, with_errors,
 };
-use crate::calibrate::{CalibrateError, Calibration, CalibrationSignal, Fit, calibrate};
+use crate::calibrate::{CalibrateError, Calibration, CalibrationSignal, FittedValues, calibrate};
 use crate::random::Random;
 use crate::simulate::Instants;
 use crate::spec::ChannelSpec;
@@ -21,7 +21,7 @@ const SPACING: FastPeriods = FastPeriods(1.0 / 1.5);
 
 /// Captures of the waveform, which begins at `start` (fast periods).
 fn captures(truth: &Spec, samples: &[f64], start: f64, noise: f64, dice: &mut Random) -> Vec<Record> {
-    let recording = Recording::new(samples, SPACING);
+    let recording = Periodic::new(samples, SPACING);
     let ratio = truth.ratio as f64;
     let count = (recording.duration().0 / ratio) as usize + 60;
     let one = |channel: &ChannelSpec| {
@@ -46,7 +46,8 @@ fn by_waveform(
     samples: &[f64],
     cutoff: Option<Cutoff>,
 ) -> Result<Calibration, CalibrateError> {
-    let settings = Settings { fit: Fit { cutoff, ..Fit::default() }, reference: 0 };
+    let settings =
+        CalibrationSettings { fit: FittedValues { cutoff, ..FittedValues::default() }, reference: 0 };
     calibrate(
         spec,
         records,

@@ -1,6 +1,6 @@
 use super::*;
 use crate::bank::SynthesisFilters;
-use crate::design::{Options, design};
+use crate::design::{DesignOptions, design};
 use crate::linalg::{self, Complex};
 use crate::runtime::{Precision, Stream};
 use crate::spec::{Band, SignalSpec, Spec};
@@ -111,7 +111,7 @@ fn recursive_bank(channels: &str, latency: usize) -> Bank {
          target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n\
          design = {{ method = \"iir\" }}"
     );
-    design(&Spec::from_toml(&text, "spec.toml").unwrap(), &Options::default()).unwrap().bank
+    design(&Spec::from_toml(&text, "spec.toml").unwrap(), &DesignOptions::default()).unwrap().bank
 }
 
 /// Converters that sample exactly in turn have the ideal samples: plain interleaving makes no error.

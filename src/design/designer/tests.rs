@@ -22,21 +22,25 @@ fn a_spec_made_in_memory_is_checked_first() {
     for method in [Method::Fir, Method::Sinc, Method::Separation] {
         let mut spec = spec("method = \"fir\", taps = 22", THESIS);
         (spec.design.method, spec.design.taps) = (method, Some(0));
-        assert!(matches!(design(&spec, &Options::default()), Err(DesignError::Spec(_))), "{}", method.name());
+        assert!(
+            matches!(design(&spec, &DesignOptions::default()), Err(DesignError::Spec(_))),
+            "{}",
+            method.name()
+        );
     }
     let mut ratio = spec("method = \"iir\"", THESIS);
     ratio.ratio = 0;
-    assert!(matches!(design(&ratio, &Options::default()), Err(DesignError::Spec(_))));
+    assert!(matches!(design(&ratio, &DesignOptions::default()), Err(DesignError::Spec(_))));
     let mut delay = spec("method = \"iir\"", THESIS);
     delay.channels[0].delay = Seconds(f64::NAN);
-    assert!(matches!(design(&delay, &Options::default()), Err(DesignError::Spec(_))));
+    assert!(matches!(design(&delay, &DesignOptions::default()), Err(DesignError::Spec(_))));
 }
 
 #[test]
 fn taps_that_the_designer_chose_are_stated() {
     for method in ["sinc", "separation"] {
         let open = spec(&format!("method = \"{method}\""), THESIS);
-        let found = design(&open, &Options::without_proof()).unwrap();
+        let found = design(&open, &DesignOptions::without_proof()).unwrap();
         assert_eq!((found.sizing.taps, found.sizing.taps_chosen), (23, true));
         // The bank says what was asked, and beside it what was chosen.
         assert_eq!(found.bank.spec, Some(open));
@@ -44,11 +48,11 @@ fn taps_that_the_designer_chose_are_stated() {
         assert!(taps.iter().all(|filter| filter.len() == 23));
         // With nothing left to choose the bank is the same.
         let sized = found.bank.sized_spec().unwrap();
-        let again = design(&sized, &Options::without_proof()).unwrap();
+        let again = design(&sized, &DesignOptions::without_proof()).unwrap();
         assert!(!again.sizing.taps_chosen && !again.sizing.latency_chosen);
         assert_eq!(again.bank, Bank { spec: Some(sized), ..found.bank });
     }
-    let recursive = design(&spec("method = \"iir\"", THESIS), &Options::without_proof()).unwrap();
+    let recursive = design(&spec("method = \"iir\"", THESIS), &DesignOptions::without_proof()).unwrap();
     assert!(!recursive.sizing.taps_chosen && recursive.sizing.taps == 0);
 }
 
@@ -56,12 +60,12 @@ fn taps_that_the_designer_chose_are_stated() {
 fn a_design_carries_its_proof_or_the_reason_why_there_is_none() {
     for method in ["method = \"fir\", taps = 22", "method = \"iir\"", "method = \"sinc\""] {
         let spec = spec(method, THESIS);
-        let found = design(&spec, &Options::default()).unwrap();
+        let found = design(&spec, &DesignOptions::default()).unwrap();
         let proven = found.proof.unwrap();
         assert!(found.bank.proof.is_some());
         assert_eq!(found.bank.gamma.upper, Some(proven.upper));
         assert!(found.bank.gamma.norm.unwrap() < proven.upper, "{proven:?}");
-        let skipped = design(&spec, &Options::without_proof()).unwrap();
+        let skipped = design(&spec, &DesignOptions::without_proof()).unwrap();
         assert_eq!(skipped.proof, Err(DesignError::ProofSkipped));
         assert!(skipped.bank.proof.is_none() && skipped.bank.filters == found.bank.filters);
     }
@@ -74,7 +78,7 @@ fn channels_that_are_alike_share_one_filter_by_their_noise() {
         "method = \"fir\", taps = 14",
         "{ delay = 1.2 }, { delay = 0.6, noise = 1e-9 }, { delay = 0.6, noise = 2e-9 }",
     );
-    let taps = |spec: &Spec| match design(spec, &Options::without_proof()).unwrap().bank.filters {
+    let taps = |spec: &Spec| match design(spec, &DesignOptions::without_proof()).unwrap().bank.filters {
         SynthesisFilters::Fir(taps) => taps,
         SynthesisFilters::StateSpace(_) => unreachable!(),
     };
@@ -84,7 +88,7 @@ fn channels_that_are_alike_share_one_filter_by_their_noise() {
         // Shares in inverse proportion to the powers, 4 : 1.
         assert!((quiet - 4.0 * loud).abs() <= 1e-15 + 1e-12 * quiet.abs(), "{quiet} {loud}");
     }
-    let norm = |spec: &Spec| design(spec, &Options::without_proof()).unwrap().bank.gamma.norm.unwrap();
+    let norm = |spec: &Spec| design(spec, &DesignOptions::without_proof()).unwrap().bank.gamma.norm.unwrap();
     assert!((norm(&alone) / norm(&twice) - 1.0).abs() < 2e-3);
 }
 
@@ -94,14 +98,14 @@ fn channels_that_are_alike_share_one_filter_by_their_noise() {
 fn a_design_that_is_ended_has_its_best_bank_so_far() {
     for method in ["method = \"fir\", taps = 22", "method = \"iir\""] {
         let spec = spec(method, THESIS);
-        let complete = design(&spec, &Options::without_proof()).unwrap().bank.gamma;
+        let complete = design(&spec, &DesignOptions::without_proof()).unwrap().bank.gamma;
         let stop = Stop::default();
         let at_filters = |stage| {
             if stage == Stage::Filters {
                 stop.now()
             }
         };
-        let options = Options { observer: &at_filters, stop: stop.clone(), ..Options::default() };
+        let options = DesignOptions { observer: &at_filters, stop: stop.clone(), ..DesignOptions::default() };
         let ended = design(&spec, &options).unwrap();
         assert_eq!(ended.proof, Err(DesignError::Stopped));
         let (norm, least) = (ended.bank.gamma.norm.unwrap(), complete.norm.unwrap());
@@ -114,7 +118,7 @@ fn a_design_that_is_ended_has_its_best_bank_so_far() {
 fn a_design_that_is_ended_before_it_has_a_bank_says_so() {
     let mut open = spec("method = \"fir\"", THESIS);
     open.latency = None;
-    let options = Options::default();
+    let options = DesignOptions::default();
     options.stop.now();
     let refused = design(&open, &options).unwrap_err();
     assert!(matches!(refused, DesignError::StoppedWithoutBank { .. }), "{refused}");
@@ -135,7 +139,7 @@ fn a_design_ends_at_every_stage_with_a_bank() {
     ];
     for text in designs {
         let spec = spec(text, THESIS);
-        let complete = design(&spec, &Options::without_proof()).unwrap().bank;
+        let complete = design(&spec, &DesignOptions::without_proof()).unwrap().bank;
         for last in [Stage::Filters, Stage::Realisation, Stage::Proof] {
             let stop = Stop::default();
             let observer = |stage| {
@@ -143,7 +147,8 @@ fn a_design_ends_at_every_stage_with_a_bank() {
                     stop.now()
                 }
             };
-            let options = Options { observer: &observer, stop: stop.clone(), ..Options::default() };
+            let options =
+                DesignOptions { observer: &observer, stop: stop.clone(), ..DesignOptions::default() };
             let ended = design(&spec, &options).unwrap();
             assert_eq!(ended.proof, Err(DesignError::Stopped), "{text} {last}");
             assert_eq!(ended.bank.check(), Ok(()), "{text} {last}");
@@ -171,9 +176,9 @@ fn a_design_that_takes_longer_than_its_limit_is_ended() {
             std::thread::sleep(limit);
         }
     };
-    let options = Options { observer: &late, time_limit: Some(limit), ..Options::default() };
+    let options = DesignOptions { observer: &late, time_limit: Some(limit), ..DesignOptions::default() };
     assert_eq!(design(&spec, &options).unwrap().proof, Err(DesignError::Stopped));
-    let unlimited = Options { time_limit: None, ..Options::default() };
+    let unlimited = DesignOptions { time_limit: None, ..DesignOptions::default() };
     assert!(design(&spec, &unlimited).unwrap().proof.is_ok());
 }
 
@@ -193,7 +198,8 @@ fn the_stated_accuracy_does_not_depend_on_units() {
                 channel(1.2),
                 channel(0.6),
             );
-            let found = design(&Spec::from_toml(&text, "spec.toml").unwrap(), &Options::without_proof());
+            let found =
+                design(&Spec::from_toml(&text, "spec.toml").unwrap(), &DesignOptions::without_proof());
             let gamma = found.unwrap().bank.gamma;
             (gamma.norm.unwrap() / output, gamma.upper.unwrap() / gamma.norm.unwrap())
         };

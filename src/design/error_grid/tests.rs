@@ -1,6 +1,6 @@
 use super::*;
 use crate::design::problem::Problem;
-use crate::lti::StateSpace;
+use crate::lti::FirMatrix;
 use crate::lti::gramian::h2_norm;
 use crate::spec::Spec;
 
@@ -23,8 +23,8 @@ fn taps(count: usize) -> Vec<Vec<f64>> {
 fn estimates_come_close_to_the_norm_from_below() {
     for (ratio, count) in [(1, 1), (2, 9), (2, 30), (3, 14)] {
         let plant = plant(ratio);
-        let lags = filters::polyphase(&taps(count), ratio);
-        let estimate = ErrorGrid::new(&plant, lags.len()).unwrap().gamma(&lags).unwrap();
+        let fir = FirMatrix::polyphase(&taps(count), ratio);
+        let estimate = ErrorGrid::new(&plant, fir.lags().len()).unwrap().gamma(&fir).unwrap();
         let norm = plant.fir_norm(&taps(count)).unwrap().gain;
         assert!(estimate <= norm * (1.0 + 1e-9) && estimate > norm * (1.0 - 1e-5), "{estimate} {norm}");
     }
@@ -34,9 +34,9 @@ fn estimates_come_close_to_the_norm_from_below() {
 fn mean_squares_are_squared_h2_norms() {
     for (ratio, count) in [(1, 1), (2, 9), (3, 14)] {
         let plant = plant(ratio);
-        let lags = filters::polyphase(&taps(count), ratio);
-        let square = ErrorGrid::new(&plant, lags.len()).unwrap().mean_square(&lags);
-        let error = plant.error_system(&StateSpace::fir(&lags));
+        let fir = FirMatrix::polyphase(&taps(count), ratio);
+        let square = ErrorGrid::new(&plant, fir.lags().len()).unwrap().mean_square(&fir);
+        let error = plant.error_system(&fir.state_space());
         let want = h2_norm(&error).unwrap().powi(2);
         assert!((square / want - 1.0).abs() < 1e-9, "{square} {want}");
     }

@@ -19,13 +19,13 @@ struct Geometric {
 impl AffineError for Geometric {
     type Scenario = ();
 
-    fn at(&self, location: &Location<()>) -> Point {
+    fn at(&self, location: &GridFrequency<()>) -> FrequencyPoint {
         self.point(location.frequency)
     }
 
-    fn peaks(&self, taps: &Taps, _level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
+    fn peaks(&self, taps: &FirMatrix, _level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
         let gain = |k: usize| {
-            let location = Location { frequency: PI * k as f64 / self.grid as f64, scenario: () };
+            let location = GridFrequency { frequency: PI * k as f64 / self.grid as f64, scenario: () };
             LocatedPeak { gain: gain(&self.point(location.frequency), taps), location }
         };
         Ok((0..=self.grid).map(gain).max_by(|a, b| a.gain.total_cmp(&b.gain)).into_iter().collect())
@@ -33,17 +33,17 @@ impl AffineError for Geometric {
 }
 
 impl Geometric {
-    fn point(&self, omega: f64) -> Point {
+    fn point(&self, omega: f64) -> FrequencyPoint {
         let z = Complex::from_polar(1.0, -omega);
         let w = CMat::from_element(1, 1, self.gain / (1.0 - z * self.a));
         let h = CMat::from_fn(self.channels.len(), 1, |i, _| Complex::new(self.channels[i], 0.0));
-        Point { omega, w, h }
+        FrequencyPoint { omega, w, h }
     }
 }
 
-fn gain(point: &Point, taps: &Taps) -> f64 {
+fn gain(point: &FrequencyPoint, taps: &FirMatrix) -> f64 {
     let mut k = point.w.clone();
-    for (j, f) in taps.iter().enumerate() {
+    for (j, f) in taps.lags().iter().enumerate() {
         k -= linalg::to_complex(f) * &point.h * Complex::from_polar(1.0, -point.omega * j as f64);
     }
     linalg::singular_values(&k).unwrap()[0]
@@ -51,8 +51,8 @@ fn gain(point: &Point, taps: &Taps) -> f64 {
 
 /// The exchange on five points to begin with, `lags` lags.
 fn exchange(error: Geometric, lags: usize, gamma_margin: f64) -> Exchange<Geometric> {
-    let points: Vec<Point> = (0..5).map(|k| error.point(PI * f64::from(k) / 4.0)).collect();
-    let problem = Problem::new(points, vec![lags]);
+    let points: Vec<FrequencyPoint> = (0..5).map(|k| error.point(PI * f64::from(k) / 4.0)).collect();
+    let problem = SampledProblem::new(points, vec![lags]);
     let objective =
         MeanSquareObjective::noiseless(vec![0.125, 0.25, 0.25, 0.25, 0.125], error.channels.len());
     Exchange::new(error, problem, std::iter::repeat(()), objective, gamma_margin)
@@ -128,16 +128,16 @@ fn a_zero_measurement_leaves_the_reference_and_a_zero_reference_has_no_error() {
     assert!((gamma - 2.0).abs() < 1e-9 && (zero_measurement.lower - 2.0).abs() < 1e-6, "{gamma}");
     let mut zero_reference = exchange(geometric(0.5, 0.0, &[1.0]), 2, 0.0);
     let best = zero_reference.optimise().unwrap();
-    assert!(best.estimate == 0.0 && best.taps.iter().all(|f| f.norm() == 0.0));
+    assert!(best.estimate == 0.0 && best.taps.lags().iter().all(|f| f.norm() == 0.0));
 }
 
 /// The optimum of all frequencies is that of a dense grid, solved at once.
 #[test]
 fn the_exchange_ends_where_a_dense_grid_does() {
     for a in [0.4, -0.7] {
-        let dense: Vec<Point> =
+        let dense: Vec<FrequencyPoint> =
             (0..=600).map(|k| geometric(a, 1.0, &[1.0, 2.0]).point(PI * f64::from(k) / 600.0)).collect();
-        let dense = sampled::minimise(&Problem::new(dense, vec![3]), FINEST_GAP, &|| false).unwrap();
+        let dense = sampled::minimise(&SampledProblem::new(dense, vec![3]), FINEST_GAP, &|| false).unwrap();
         let mut exchange = exchange(geometric(a, 1.0, &[1.0, 2.0]), 3, 0.0);
         let best = exchange.optimise().unwrap();
         assert!((best.estimate / dense.gamma - 1.0).abs() < 1e-5, "{} {}", best.estimate, dense.gamma);
@@ -162,7 +162,7 @@ fn a_wider_margin_lowers_the_mean_square_within_the_cap() {
 #[test]
 fn known_frequencies_are_not_added_twice() {
     let mut exchange = exchange(geometric(0.5, 1.0, &[1.0]), 1, 0.0);
-    let at = |frequency: f64| Location { frequency, scenario: () };
+    let at = |frequency: f64| GridFrequency { frequency, scenario: () };
     assert!(!exchange.add(&[at(0.0), at(PI + 1e-9)]));
     assert!(exchange.add(&[at(1.0), at(1.0)]));
     assert_eq!(exchange.locations.len(), 6);

@@ -1,7 +1,7 @@
 //! The comparison methods of thesis 5.6.3: sinc interpolation of recurrent nonuniform samples, and first
 //! fractional-delay filters, then a bank for integer delays.
 
-use super::{Settings, Synthesis, fir};
+use super::{MethodSettings, Synthesis, fir};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::design::problem::{Channel, Problem};
@@ -14,7 +14,7 @@ use crate::units::{FastPeriods, GridTime};
 /// # Errors
 /// [`DesignError::SincNeedsNyquist`] unless N = M; [`DesignError::Sampling`] for delays that coincide
 /// modulo the slow period.
-pub(crate) fn sinc(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
+pub(crate) fn sinc(plant: &LiftedPlant, settings: &MethodSettings) -> Result<Synthesis, DesignError> {
     let (problem, channels, ratio) = (plant.problem(), plant.channels(), plant.ratio());
     if channels != ratio {
         return Err(DesignError::SincNeedsNyquist { channels, ratio });
@@ -35,7 +35,7 @@ pub(crate) fn sinc(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis
 ///
 /// # Errors
 /// As [`fir::synthesise`]; [`DesignError::NoSlowRate`] without the channels at the slow rate.
-pub(crate) fn separation(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
+pub(crate) fn separation(plant: &LiftedPlant, settings: &MethodSettings) -> Result<Synthesis, DesignError> {
     let problem = plant.problem();
     let split = Split::new(problem, settings.taps);
     let grid = grid_delays(problem);
@@ -54,7 +54,7 @@ pub(crate) fn separation(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
 /// The taps of least gamma, without regard to noise.
 fn fir_taps(problem: &Problem, taps: usize) -> Result<Vec<Vec<f64>>, DesignError> {
     let noiseless = Problem { noise: vec![0.0; problem.channels.len()], ..problem.clone() };
-    let settings = Settings { taps, ..Settings::default() };
+    let settings = MethodSettings { taps, ..MethodSettings::default() };
     fir::taps_of_least_gamma(&LiftedPlant::new(&noiseless), &settings)
 }
 

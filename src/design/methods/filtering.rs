@@ -76,13 +76,13 @@ struct DelayedChannel {
 }
 
 /// A filter xh+ = a xh + b y, zh = c xh + d y.
-pub(super) type Filter = StateSpace;
+pub(super) type ReferenceFilter = StateSpace;
 
 /// The result for one gamma.
 #[derive(Debug, Clone)]
 pub(super) enum Trial {
     /// A stable filter that achieves it.
-    Achieved(Filter),
+    Achieved(ReferenceFilter),
     /// The stabilising solution exists and has the wrong inertia, so no filter achieves gamma.
     Impossible,
     /// Undecided, for numerical reasons.
@@ -233,7 +233,7 @@ impl Innovations {
     }
 
     /// The mean-square optimal (Kalman) filter, which is the limit for gamma to infinity.
-    pub(super) fn h2(&self) -> Option<Filter> {
+    pub(super) fn h2(&self) -> Option<ReferenceFilter> {
         self.filter(&self.mean_square_covariance()?)
     }
 
@@ -323,7 +323,7 @@ impl Innovations {
 
     /// The central filter of a covariance: gains K = F P C2' Ry^-1 and Df = C1 P C2' Ry^-1. Its states are
     /// estimates of the plant's states, in all coordinates of P.
-    fn filter(&self, p: &Mat) -> Option<Filter> {
+    fn filter(&self, p: &Mat) -> Option<ReferenceFilter> {
         let pc = p * self.c2.transpose();
         let gain = linalg::solve_positive(&self.innovation(p), &pc.transpose()).ok()?.transpose();
         let filter = match &self.plain {
@@ -334,7 +334,7 @@ impl Innovations {
     }
 
     /// The filter that corrects its state by `gain` times the innovation.
-    fn with_gain(&self, gain: &Mat) -> Filter {
+    fn with_gain(&self, gain: &Mat) -> ReferenceFilter {
         let Self { f, b1, c1, c2, .. } = self;
         let (mut k, mut df) = (f * gain, c1 * gain);
         let (a, c) = (f - &k * c2, c1 - &df * c2);

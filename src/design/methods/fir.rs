@@ -6,13 +6,12 @@
 //! only estimated, from the peaks between the points of a fine grid; the taps that are returned have the
 //! computed one.
 
-use super::{GAMMA_ACCURACY, Settings, Synthesis, tap_lags};
+use super::{GAMMA_ACCURACY, MethodSettings, Synthesis, tap_lags};
 use crate::design::DesignError;
-use crate::design::error_grid::{ErrorGrid, Location};
+use crate::design::error_grid::{ErrorGrid, GridFrequency};
 use crate::design::exchange::{Exchange, LEAST_MARGIN};
-use crate::design::filters::impulse_responses;
 use crate::design::plant::LiftedPlant;
-use crate::lmi::sampled::{MeanSquareObjective, Problem};
+use crate::lmi::sampled::{MeanSquareObjective, SampledProblem};
 use crate::lti::peak::Peak;
 
 /// Default relative margin of gamma that may be spent on less noise at the output, if the converters' noise
@@ -28,11 +27,10 @@ const MISSED_PEAK_LIMIT: usize = 8;
 ///
 /// # Errors
 /// [`DesignError::Lti`] for unstable plants; [`DesignError::Linalg`] if a decomposition fails.
-pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
+pub(crate) fn synthesise(plant: &LiftedPlant, settings: &MethodSettings) -> Result<Synthesis, DesignError> {
     let mut exchange = exchange(plant, settings)?;
     let best = least_gamma(plant, settings.taps, &mut exchange)?;
-    let found = Synthesis::of_least_gamma(plant, best.taps, best.peak, exchange.lower_for_all)?;
-    Ok(Synthesis { iterations: exchange.iterations, ..found })
+    Synthesis::of_least_gamma(plant, best.taps, best.peak, exchange.lower_for_all)
 }
 
 /// The taps of [`synthesise`] alone.
@@ -41,19 +39,22 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
 /// As [`synthesise`].
 pub(super) fn taps_of_least_gamma(
     plant: &LiftedPlant,
-    settings: &Settings,
+    settings: &MethodSettings,
 ) -> Result<Vec<Vec<f64>>, DesignError> {
     Ok(least_gamma(plant, settings.taps, &mut exchange(plant, settings)?)?.taps)
 }
 
-fn exchange<'a>(plant: &'a LiftedPlant, settings: &Settings) -> Result<Exchange<ErrorGrid<'a>>, DesignError> {
+fn exchange<'a>(
+    plant: &'a LiftedPlant,
+    settings: &MethodSettings,
+) -> Result<Exchange<ErrorGrid<'a>>, DesignError> {
     let lags = tap_lags(plant.ratio(), settings.taps);
     let grid = ErrorGrid::new(plant, lags[0])?;
     let (points, weights) = grid.coarse();
     let noise = plant.problem().noise.clone();
     let margin = settings.gamma_margin.unwrap_or_else(|| usual_margin(&noise));
     let objective = MeanSquareObjective { weights, noise };
-    let problem = Problem::new(points, lags);
+    let problem = SampledProblem::new(points, lags);
     let mut exchange = Exchange::new(grid, problem, std::iter::repeat(()), objective, margin);
     exchange.stop = settings.stop.clone();
     Ok(exchange)
@@ -65,14 +66,14 @@ fn usual_margin(noise: &[f64]) -> f64 {
 }
 
 /// Taps with their norm.
-struct Evaluated {
+struct EvaluatedTaps {
     taps: Vec<Vec<f64>>,
     /// Their norm, estimated on the grid.
     estimate: f64,
     peak: Peak,
 }
 
-impl Evaluated {
+impl EvaluatedTaps {
     /// Whether the grid missed the peak of the norm.
     fn is_missed(&self) -> bool {
         self.peak.gain > self.estimate * (1.0 + GAMMA_ACCURACY)
@@ -85,12 +86,12 @@ fn least_gamma(
     plant: &LiftedPlant,
     length: usize,
     exchange: &mut Exchange<ErrorGrid<'_>>,
-) -> Result<Evaluated, DesignError> {
+) -> Result<EvaluatedTaps, DesignError> {
     let mut best = judged(plant, length, exchange)?;
     for _ in 0..MISSED_PEAK_LIMIT {
         if !best.is_missed()
             || exchange.stop.is_due()
-            || !exchange.add(&[Location { frequency: best.peak.frequency, scenario: () }])
+            || !exchange.add(&[GridFrequency { frequency: best.peak.frequency, scenario: () }])
         {
             break;
         }
@@ -106,9 +107,9 @@ fn judged(
     plant: &LiftedPlant,
     length: usize,
     exchange: &mut Exchange<ErrorGrid<'_>>,
-) -> Result<Evaluated, DesignError> {
+) -> Result<EvaluatedTaps, DesignError> {
     let found = exchange.optimise()?;
-    let taps = impulse_responses(&found.taps, length);
+    let taps = found.taps.impulse_responses(length);
     let peak = plant.fir_norm(&taps)?;
-    Ok(Evaluated { taps, estimate: found.estimate, peak })
+    Ok(EvaluatedTaps { taps, estimate: found.estimate, peak })
 }

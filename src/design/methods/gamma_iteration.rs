@@ -1,6 +1,6 @@
 //! Gamma-iteration: the search for the least gamma for which the filtering Riccati equation has a solution.
 
-use super::filtering::{Filter, Innovations, RiccatiSolver, Trial};
+use super::filtering::{Innovations, ReferenceFilter, RiccatiSolver, Trial};
 use super::{GAMMA_ACCURACY, Synthesis};
 use crate::bank::SynthesisFilters;
 use crate::design::DesignError;
@@ -22,20 +22,13 @@ const BRACKET_SHARE: f64 = 0.5;
 const ZERO_GAMMA: f64 = 1e-12;
 /// The bracket halves (on the logarithmic scale) in each trial.
 const TRIAL_LIMIT: usize = 80;
-/// Number of smaller gammas that are tried after an unresolved one.
-const TRIALS_BELOW: usize = 8;
-/// Limit on the number of gamma-iterations; trials at smaller gammas come between them.
-const ROUND_LIMIT: usize = 4;
 /// Relative distance below the least gamma found at which a more precise solver must find no filter.
 const CONFIRMED_BELOW: f64 = 2e-6;
-/// Another gamma-iteration follows if the trials at smaller gammas reduced gamma to less than this
-/// fraction.
-const WORTHWHILE_REDUCTION: f64 = 0.9;
 
 /// Filters with the norm of their error system.
 #[derive(Debug, Clone)]
-pub(super) struct Evaluated {
-    filters: Filter,
+pub(super) struct EvaluatedFilters {
+    filters: ReferenceFilter,
     pub(super) peak: Peak,
 }
 
@@ -49,9 +42,7 @@ pub(super) struct GammaIteration<'a> {
     feedthrough: f64,
     /// No causal filter achieves less.
     lower: f64,
-    best: Option<Evaluated>,
-    /// Riccati equations solved.
-    trials: usize,
+    best: Option<EvaluatedFilters>,
     /// Ends the search between two trials, with the best filters so far.
     stop: Stop,
     negligible: f64,
@@ -73,7 +64,6 @@ impl<'a> GammaIteration<'a> {
             feedthrough,
             lower: noncausal.gain.max(feedthrough),
             best: None,
-            trials: 0,
             stop: stop.clone(),
             negligible: ZERO_GAMMA * (system.c().norm() * system.b().norm() + system.d().norm()),
         })
@@ -105,11 +95,11 @@ impl<'a> GammaIteration<'a> {
 
     /// The filters with their norm; `None` if rounding errors made the filters unstable or are as large as
     /// the norm.
-    pub(super) fn evaluate(&self, filters: Filter) -> Result<Option<Evaluated>, DesignError> {
+    pub(super) fn evaluate(&self, filters: ReferenceFilter) -> Result<Option<EvaluatedFilters>, DesignError> {
         let norm = self.plant.norm(&filters);
         match norm.and_then(|peak| Ok((self.plant.rounding(&filters)? < peak.gain, peak))) {
             Ok((is_known, peak)) if is_known || self.is_negligible(peak.gain) => {
-                Ok(Some(Evaluated { filters, peak }))
+                Ok(Some(EvaluatedFilters { filters, peak }))
             }
             Ok(_) => Ok(None),
             Err(DesignError::Lti(LtiError::Unstable { .. } | LtiError::IterationLimit { .. })) => Ok(None),
@@ -117,7 +107,7 @@ impl<'a> GammaIteration<'a> {
         }
     }
 
-    fn keep(&mut self, found: Evaluated) {
+    fn keep(&mut self, found: EvaluatedFilters) {
         if self.best.as_ref().is_none_or(|best| found.peak.gain < best.peak.gain) {
             self.best = Some(found);
         }
@@ -126,9 +116,8 @@ impl<'a> GammaIteration<'a> {
     /// Keeps the first of the mean-square optimal filters that is stable.
     pub(super) fn start_from(
         &mut self,
-        mean_square: impl Iterator<Item = Filter>,
+        mean_square: impl Iterator<Item = ReferenceFilter>,
     ) -> Result<(), DesignError> {
-        self.trials += 1;
         for filters in mean_square {
             if let Some(found) = self.evaluate(filters)? {
                 self.keep(found);
@@ -159,7 +148,6 @@ impl<'a> GammaIteration<'a> {
     /// Tries one gamma. A filter counts as found only if its computed norm confirms gamma.
     fn attempt(&mut self, gamma: f64) -> Result<Trial, DesignError> {
         for solver in self.solvers() {
-            self.trials += 1;
             match solver.h_infinity(gamma) {
                 Trial::Achieved(filters) => {
                     let Some(found) = self.evaluate(filters.clone())? else { continue };
@@ -184,40 +172,8 @@ impl<'a> GammaIteration<'a> {
         Ok(())
     }
 
-    /// Gamma-iteration, and a few trials at smaller gammas after an unresolved trial: near the limits of
-    /// double precision a smaller gamma may be solvable.
+    /// Halves the bracket until it is narrow. A gamma that is not resolved counts as too small.
     pub(super) fn bisect(&mut self) -> Result<(), DesignError> {
-        for _ in 0..ROUND_LIMIT {
-            if self.bisect_once()? {
-                break;
-            }
-            let before = self.upper();
-            self.try_below()?;
-            // Also false if nothing was found.
-            let gained = self.upper() < WORTHWHILE_REDUCTION * before;
-            if !gained {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    fn try_below(&mut self) -> Result<(), DesignError> {
-        let start = self.ceiling()?;
-        let ratio = self.floor() / start;
-        for k in 1..=TRIALS_BELOW {
-            let gamma = start * ratio.powf(k as f64 / (TRIALS_BELOW + 1) as f64);
-            if matches!(self.attempt_or_exclude(gamma)?, Trial::Impossible) {
-                break;
-            }
-        }
-        Ok(())
-    }
-
-    /// Whether the lower end of the last bracket is a gamma that no filter achieves: else the trial there
-    /// was not resolved.
-    fn bisect_once(&mut self) -> Result<bool, DesignError> {
-        let mut is_impossible = true;
         let (mut floor, mut ceiling) = (self.floor(), self.ceiling()?);
         for _ in 0..TRIAL_LIMIT {
             if self.done() || ceiling <= floor * (1.0 + BRACKET_SHARE * GAMMA_ACCURACY) {
@@ -226,11 +182,10 @@ impl<'a> GammaIteration<'a> {
             let gamma = (floor * ceiling).sqrt();
             match self.attempt_or_exclude(gamma)? {
                 Trial::Achieved(_) => ceiling = gamma.min(self.upper()),
-                Trial::Impossible => (floor, is_impossible) = (gamma, true),
-                Trial::Unresolved => (floor, is_impossible) = (gamma, false),
+                Trial::Impossible | Trial::Unresolved => floor = gamma,
             }
         }
-        Ok(is_impossible)
+        Ok(())
     }
 
     /// As [`GammaIteration::attempt`]; a gamma that no filter achieves raises the lower bound.
@@ -261,7 +216,7 @@ impl<'a> GammaIteration<'a> {
     ///
     /// # Errors
     /// [`DesignError::RiccatiFailed`] if there are none.
-    pub(super) fn best(&self) -> Result<Evaluated, DesignError> {
+    pub(super) fn best(&self) -> Result<EvaluatedFilters, DesignError> {
         match &self.best {
             Some(best) => Ok(best.clone()),
             None => Err(self.failed(Some(self.zero_output_norm()?))),
@@ -274,14 +229,13 @@ impl<'a> GammaIteration<'a> {
     }
 
     /// `chosen` with the bounds that were found.
-    pub(super) fn synthesis(&self, chosen: Evaluated) -> Synthesis {
-        let Evaluated { filters, peak } = chosen;
+    pub(super) fn synthesis(&self, chosen: EvaluatedFilters) -> Synthesis {
+        let EvaluatedFilters { filters, peak } = chosen;
         Synthesis {
             filters: SynthesisFilters::StateSpace(to_block(&filters)),
             peak,
             lower: self.lower.min(peak.gain),
             noncausal: self.noncausal.gain.min(peak.gain),
-            iterations: self.trials,
             robust: None,
         }
     }

@@ -2,10 +2,10 @@
 //! the noise of the converters: the Kalman filter, which is `iir` at gamma = infinity.
 
 use super::Synthesis;
-use super::filtering::{Filter, Innovations};
+use super::filtering::{Innovations, ReferenceFilter};
 use super::gamma_iteration::GammaIteration;
 use super::precise_filtering::PreciseFiltering;
-use crate::arithmetic::{DoubleDouble, Float512, Number};
+use crate::arithmetic::{DoubleDouble, Float, Float512};
 use crate::design::DesignError;
 use crate::design::limits::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS, Stop};
 use crate::design::plant::LiftedPlant;
@@ -30,9 +30,9 @@ pub(crate) fn synthesise(plant: &LiftedPlant, stop: &Stop) -> Result<Synthesis, 
     let innovations = Innovations::in_all_coordinates(&noisy)?;
     // gamma is that of the signal alone, so the noise counts in the filters and not in the bounds.
     let mut iteration = GammaIteration::new(plant, &[Rc::new(Innovations::new(plant)?)], &Stop::default())?;
-    let mut candidates: Vec<Filter> = innovations.iter().filter_map(|form| form.h2()).collect();
+    let mut candidates: Vec<ReferenceFilter> = innovations.iter().filter_map(|form| form.h2()).collect();
     // Double precision loses up to a fifth of the mean square after smooth front ends, and nothing shows it.
-    let is_due = |candidates: &[Filter]| !candidates.is_empty() && stop.is_due();
+    let is_due = |candidates: &[ReferenceFilter]| !candidates.is_empty() && stop.is_due();
     let precise_filter = match is_due(&candidates) {
         true => None,
         false => precise::<DoubleDouble>(&noisy, MOST_STATES_AT_106_BITS)?,
@@ -55,7 +55,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, stop: &Stop) -> Result<Synthesis, 
 }
 
 /// The mean-square optimal filter in the precision of `F`, for plants of at most `limit` states.
-fn precise<F: Number>(plant: &LiftedPlant, limit: usize) -> Result<Option<Filter>, DesignError> {
+fn precise<F: Float>(plant: &LiftedPlant, limit: usize) -> Result<Option<ReferenceFilter>, DesignError> {
     if plant.system().order() > limit {
         return Ok(None);
     }
@@ -63,7 +63,7 @@ fn precise<F: Number>(plant: &LiftedPlant, limit: usize) -> Result<Option<Filter
 }
 
 /// ||K||_2 with the noise; infinite for a filter that rounding made unstable, whose Gramian has no limit.
-fn rms_error(plant: &LiftedPlant, filter: &Filter) -> Result<f64, DesignError> {
+fn rms_error(plant: &LiftedPlant, filter: &ReferenceFilter) -> Result<f64, DesignError> {
     match h2_norm(&plant.error_system(filter)) {
         Err(LtiError::IterationLimit { .. }) => Ok(f64::INFINITY),
         norm => Ok(norm?),

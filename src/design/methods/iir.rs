@@ -1,11 +1,11 @@
 //! The bank with the least gamma of all causal banks, by a-posteriori H-infinity filtering and
 //! gamma-iteration (thesis 5.3).
 
-use super::filtering::{Filter, Innovations, RiccatiSolver, Trial};
-use super::gamma_iteration::{Evaluated, GammaIteration};
+use super::filtering::{Innovations, ReferenceFilter, RiccatiSolver, Trial};
+use super::gamma_iteration::{EvaluatedFilters, GammaIteration};
 use super::precise_filtering::PreciseFiltering;
-use super::{Settings, Synthesis};
-use crate::arithmetic::{DoubleDouble, Float512, Number};
+use super::{MethodSettings, Synthesis};
+use crate::arithmetic::{DoubleDouble, Float, Float512};
 use crate::design::DesignError;
 use crate::design::limits::{MOST_STATES_AT_106_BITS, MOST_STATES_AT_512_BITS};
 use crate::design::plant::LiftedPlant;
@@ -21,7 +21,7 @@ const NOISE_SHARES: [f64; 6] = [1.0, 0.5, 0.25, 0.1, 0.03, 0.01];
 /// # Errors
 /// [`DesignError::RiccatiFailed`] if no Riccati equation could be solved, [`DesignError::Lti`] if the plant
 /// is not stable.
-pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
+pub(crate) fn synthesise(plant: &LiftedPlant, settings: &MethodSettings) -> Result<Synthesis, DesignError> {
     let innovations = Innovations::in_all_coordinates(plant)?;
     let mut iteration = GammaIteration::new(plant, &innovations, &settings.stop)?;
     iteration.start_from(innovations.iter().filter_map(|form| form.h2()))?;
@@ -36,7 +36,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Syn
 
 /// Goes on in the precision of `F` where the search so far left the optimum open, for plants of at most
 /// `limit` states.
-fn refine<F: Number>(
+fn refine<F: Float>(
     plant: &LiftedPlant,
     iteration: &mut GammaIteration<'_>,
     limit: usize,
@@ -57,9 +57,9 @@ fn refine<F: Number>(
 fn relaxed(
     plant: &LiftedPlant,
     iteration: &mut GammaIteration<'_>,
-    optimum: &Evaluated,
+    optimum: &EvaluatedFilters,
     margin: f64,
-) -> Result<Option<Evaluated>, DesignError> {
+) -> Result<Option<EvaluatedFilters>, DesignError> {
     if margin <= 0.0 || iteration.is_stopped() || iteration.is_negligible(optimum.peak.gain) {
         return Ok(None);
     }
@@ -84,7 +84,7 @@ fn relaxed_with_noise(
     plant: &LiftedPlant,
     iteration: &mut GammaIteration<'_>,
     cap: f64,
-) -> Result<Option<Evaluated>, DesignError> {
+) -> Result<Option<EvaluatedFilters>, DesignError> {
     for share in NOISE_SHARES {
         let noisy = plant.with_noise_scaled(share);
         for form in Innovations::in_all_coordinates(&noisy)? {
@@ -106,8 +106,8 @@ fn relaxed_with_noise(
 /// The filters with their norm, if it is at most `cap`.
 fn within(
     iteration: &mut GammaIteration<'_>,
-    filters: Filter,
+    filters: ReferenceFilter,
     cap: f64,
-) -> Result<Option<Evaluated>, DesignError> {
+) -> Result<Option<EvaluatedFilters>, DesignError> {
     Ok(iteration.evaluate(filters)?.filter(|found| found.peak.gain <= cap))
 }

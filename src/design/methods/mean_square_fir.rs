@@ -6,7 +6,7 @@
 //! from the newest `J_p = ceil((taps - p) / M)` frames. A channel of which little is known gets little
 //! weight, and the bank is never worse than the best single channel.
 
-use super::{Settings, Synthesis};
+use super::{MethodSettings, Synthesis};
 use crate::design::DesignError;
 use crate::design::fir_errors::{BankSize, FirErrors};
 use crate::design::plant::LiftedPlant;
@@ -16,7 +16,7 @@ use crate::design::plant::LiftedPlant;
 ///
 /// # Errors
 /// [`DesignError::Lti`] for unstable plants.
-pub(crate) fn synthesise(plant: &LiftedPlant, settings: &Settings) -> Result<Synthesis, DesignError> {
+pub(crate) fn synthesise(plant: &LiftedPlant, settings: &MethodSettings) -> Result<Synthesis, DesignError> {
     let problem = plant.problem();
     let latency = problem.latency;
     let errors = FirErrors::new(problem, &settings.deviations, settings.taps, latency..=latency);

@@ -31,7 +31,7 @@ use crate::spec::{ErrorBox, Method};
 
 /// Settings of a method, in addition to the plant.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Settings {
+pub(crate) struct MethodSettings {
     /// Taps per channel at the fast rate; 0 for recursive filters.
     pub(crate) taps: usize,
     /// Relative excess over the least gamma that may be spent on a smaller mean square; `None` is the
@@ -58,8 +58,6 @@ pub(crate) struct Synthesis {
     pub(crate) lower: f64,
     /// Lower bound of the norm over all filters of any latency. At most `peak.gain`.
     pub(crate) noncausal: f64,
-    /// Number of interior-point iterations or of Riccati equations solved.
-    pub(crate) iterations: usize,
     /// For a robust design.
     pub(crate) robust: Option<robust_fir::RobustStudy>,
 }
@@ -84,7 +82,6 @@ impl Synthesis {
             lower: lower.min(peak.gain).max(noncausal),
             peak,
             noncausal,
-            iterations: 0,
             robust: None,
         })
     }
@@ -102,7 +99,7 @@ pub(crate) fn tap_lags(ratio: usize, taps: usize) -> Vec<usize> {
 pub(crate) fn synthesise(
     method: Method,
     plant: &LiftedPlant,
-    settings: &Settings,
+    settings: &MethodSettings,
 ) -> Result<Synthesis, DesignError> {
     if let (Method::Fir, Some(errors)) = (method, &settings.robust) {
         return robust_fir::synthesise(plant, settings, errors);

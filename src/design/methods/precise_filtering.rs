@@ -21,7 +21,7 @@
 //! whose limit doubling reaches in a few steps.
 
 use super::filtering::{RiccatiSolver, Trial, output_sizes};
-use crate::arithmetic::Number;
+use crate::arithmetic::Float;
 use crate::arithmetic::dense::{self, product, riccati_limit, select, solve, symmetric};
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
@@ -58,7 +58,7 @@ pub(super) struct PreciseFiltering<F> {
 }
 
 /// One step of the difference equation.
-struct Step<F> {
+struct RiccatiStep<F> {
     /// P+.
     next: Matrix<F>,
     /// Re.
@@ -67,7 +67,7 @@ struct Step<F> {
     cross: Matrix<F>,
 }
 
-impl<F: Number> PreciseFiltering<F> {
+impl<F: Float> PreciseFiltering<F> {
     pub(super) fn new(plant: &LiftedPlant) -> Result<Self, DesignError> {
         let system = plant.system();
         let measured = plant.channels();
@@ -116,7 +116,7 @@ impl<F: Number> PreciseFiltering<F> {
         for _ in 0..self.start {
             p = self.step(&p, gamma)?.next;
         }
-        let Step { next, innovation, cross } = self.step(&p, gamma)?;
+        let RiccatiStep { next, innovation, cross } = self.step(&p, gamma)?;
         let c = self.rows(self.outputs(gamma));
         let weighted = solve(&innovation, &c)?;
         let f = self.rows(self.states()) - product(&cross.transpose(), &weighted);
@@ -130,7 +130,7 @@ impl<F: Number> PreciseFiltering<F> {
     }
 
     /// The step from `p`. A measurement that is zero so far adds nothing.
-    fn step(&self, p: &Matrix<F>, gamma: Option<f64>) -> Option<Step<F>> {
+    fn step(&self, p: &Matrix<F>, gamma: Option<f64>) -> Option<RiccatiStep<F>> {
         let mut gram = self.gram(p);
         let square = F::from(gamma.unwrap_or(0.0)) * F::from(gamma.unwrap_or(0.0));
         self.references().for_each(|i| gram[(i, i)] -= square);
@@ -138,7 +138,7 @@ impl<F: Number> PreciseFiltering<F> {
         let active: Vec<usize> = outputs.iter().copied().filter(|&i| gram[(i, i)] != F::ZERO).collect();
         let seen = select(&gram, &active, &states);
         let explained = product(&seen.transpose(), &solve(&select(&gram, &active, &active), &seen)?);
-        Some(Step {
+        Some(RiccatiStep {
             next: symmetric(&(select(&gram, &states, &states) - explained)),
             innovation: select(&gram, &outputs, &outputs),
             cross: select(&gram, &outputs, &states),
@@ -149,13 +149,13 @@ impl<F: Number> PreciseFiltering<F> {
     /// achieves gamma: positive for the measurements, negative for the references given these. `None` if
     /// digits were lost on the way, so that the signs say nothing.
     fn is_right(&self, covariance: &Matrix<F>, gamma: f64) -> Option<bool> {
-        let Step { next, innovation, .. } = self.step(covariance, Some(gamma))?;
+        let RiccatiStep { next, innovation, .. } = self.step(covariance, Some(gamma))?;
         let change = |i: usize| (next[(i, i)] - covariance[(i, i)]).nearest().abs();
         let size = |i: usize| {
             covariance[(i, i)].nearest().abs() + ZERO_COVARIANCE * self.input_gram[(i, i)].nearest()
         };
         let settled = self.states().all(|i| change(i) <= FIXED_POINT_ACCURACY * size(i));
-        let pivots: Vec<f64> = dense::pivots(&innovation).into_iter().map(Number::nearest).collect();
+        let pivots: Vec<f64> = dense::pivots(&innovation).into_iter().map(Float::nearest).collect();
         if !settled || !pivots.iter().all(|pivot| pivot.is_finite()) {
             return None;
         }
@@ -194,7 +194,7 @@ impl<F: Number> PreciseFiltering<F> {
     }
 }
 
-impl<F: Number> RiccatiSolver for PreciseFiltering<F> {
+impl<F: Float> RiccatiSolver for PreciseFiltering<F> {
     fn h_infinity(&self, gamma: f64) -> Trial {
         let Some(covariance) = self.covariance(Some(gamma)) else { return Trial::Unresolved };
         match self.is_right(&covariance, gamma) {
@@ -206,7 +206,7 @@ impl<F: Number> RiccatiSolver for PreciseFiltering<F> {
 }
 
 /// Whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below -[`SEMIDEFINITE`].
-fn is_semidefinite<F: Number>(m: &Matrix<F>) -> bool {
+fn is_semidefinite<F: Float>(m: &Matrix<F>) -> bool {
     let kept: Vec<usize> = (0..m.nrows()).filter(|&i| m[(i, i)].nearest() != 0.0).collect();
     if kept.iter().any(|&i| m[(i, i)].nearest() < 0.0) {
         return false;
@@ -219,8 +219,8 @@ fn is_semidefinite<F: Number>(m: &Matrix<F>) -> bool {
     dense::cholesky(&scaled).is_some()
 }
 
-fn nearest<F: Number>(m: &Matrix<F>) -> Mat {
-    m.map(Number::nearest)
+fn nearest<F: Float>(m: &Matrix<F>) -> Mat {
+    m.map(Float::nearest)
 }
 
 #[cfg(test)]

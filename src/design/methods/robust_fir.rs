@@ -6,17 +6,18 @@
 //! [`crate::design::uncertainty::search`] finds them, and its dual stays a lower bound for all banks of that
 //! length over the box.
 
-use super::{Settings, Synthesis, fir, tap_lags};
+use super::{MethodSettings, Synthesis, fir, tap_lags};
 use crate::bank::SynthesisFilters;
 use crate::design::DesignError;
-use crate::design::error_grid::{AffineError, ErrorGrid, LocatedPeak, Location};
+use crate::design::error_grid::{AffineError, ErrorGrid, GridFrequency, LocatedPeak};
 use crate::design::exchange::{Exchange, Tolerances};
-use crate::design::filters::{FilterResponse, impulse_responses};
+use crate::design::filters::FilterResponse;
 use crate::design::plant::LiftedPlant;
 use crate::design::uncertainty::box_plant::{BoxPlant, Combination};
 use crate::design::uncertainty::search::BoxSearch;
 use crate::linalg::{self, CMat};
-use crate::lmi::sampled::{MeanSquareObjective, Point, Problem as SampledProblem, Taps};
+use crate::lmi::sampled::{FrequencyPoint, MeanSquareObjective, SampledProblem};
+use crate::lti::FirMatrix;
 use crate::spec::{ErrorBox, Method, Spec};
 use crate::units::Seconds;
 
@@ -57,7 +58,7 @@ impl RobustStudy {
 /// As [`fir::synthesise`].
 pub(crate) fn synthesise(
     plant: &LiftedPlant,
-    settings: &Settings,
+    settings: &MethodSettings,
     errors: &ErrorBox,
 ) -> Result<Synthesis, DesignError> {
     let nominal = fir::synthesise(plant, settings)?;
@@ -72,12 +73,7 @@ pub(crate) fn synthesise(
     if study.robust.largest_found >= study.nominal.largest_found {
         return Ok(Synthesis { robust: Some(RobustStudy { robust: study.nominal, ..study }), ..nominal });
     }
-    Ok(Synthesis {
-        lower: nominal.lower.min(found.peak.gain),
-        iterations: nominal.iterations + found.iterations,
-        robust: Some(study),
-        ..found
-    })
+    Ok(Synthesis { lower: nominal.lower.min(found.peak.gain), robust: Some(study), ..found })
 }
 
 /// The study of a design that keeps the nominal bank.
@@ -102,14 +98,14 @@ fn study_of(nominal: &Synthesis, search: &BoxSearch) -> Result<RobustStudy, Desi
 fn least_worst_norm(
     plant: &LiftedPlant,
     search: BoxSearch,
-    settings: &Settings,
+    settings: &MethodSettings,
     study: RobustStudy,
 ) -> Result<(RobustStudy, Synthesis), DesignError> {
     let mut exchange = exchange(plant, search, settings)?;
     let mut rounds = 0;
     let (taps, largest_found) = loop {
         let found = exchange.optimise_at(Tolerances::gradual(NORM_ACCURACY))?;
-        let taps = impulse_responses(&found.taps, settings.taps);
+        let taps = found.taps.impulse_responses(settings.taps);
         let worst = exchange.error.search.worst(&SynthesisFilters::Fir(taps.clone()))?;
         let enough = found.estimate.max(exchange.lower) * (1.0 + NORM_ACCURACY);
         rounds += 1;
@@ -117,7 +113,7 @@ fn least_worst_norm(
             break (taps, worst.peak.gain);
         }
         let scenario = exchange.error.search.include(&worst.point);
-        if !exchange.add(&[Location { frequency: worst.peak.frequency, scenario }]) {
+        if !exchange.add(&[GridFrequency { frequency: worst.peak.frequency, scenario }]) {
             break (taps, worst.peak.gain);
         }
     };
@@ -132,8 +128,7 @@ fn least_worst_norm(
         pairs: exchange.locations.len(),
         ..study
     };
-    let found = Synthesis::of_least_gamma(plant, taps, peak, 0.0)?;
-    Ok((study, Synthesis { iterations: exchange.iterations, ..found }))
+    Ok((study, Synthesis::of_least_gamma(plant, taps, peak, 0.0)?))
 }
 
 /// The error of fixed taps over the box.
@@ -146,7 +141,7 @@ struct BoxError {
 impl AffineError for BoxError {
     type Scenario = Combination;
 
-    fn at(&self, location: &Location<Combination>) -> Point {
+    fn at(&self, location: &GridFrequency<Combination>) -> FrequencyPoint {
         let response = self.search.plant().response(location.frequency);
         let h = self.search.plant().measurements(&response, &location.scenario);
         let count = h.nrows();
@@ -154,10 +149,10 @@ impl AffineError for BoxError {
         let rows = |first: usize, rows: usize| -> CMat {
             g.rows(first, rows).into_owned().resize_horizontally(self.inputs, Default::default())
         };
-        Point { omega: location.frequency, h: rows(0, count), w: rows(count, g.nrows() - count) }
+        FrequencyPoint { omega: location.frequency, h: rows(0, count), w: rows(count, g.nrows() - count) }
     }
 
-    fn peaks(&self, taps: &Taps, level: f64) -> Result<Vec<LocatedPeak<Combination>>, DesignError> {
+    fn peaks(&self, taps: &FirMatrix, level: f64) -> Result<Vec<LocatedPeak<Combination>>, DesignError> {
         self.search.peaks(&FilterResponse::Polynomial(taps.clone()), level)
     }
 }
@@ -165,7 +160,7 @@ impl AffineError for BoxError {
 fn exchange(
     plant: &LiftedPlant,
     search: BoxSearch,
-    settings: &Settings,
+    settings: &MethodSettings,
 ) -> Result<Exchange<BoxError>, DesignError> {
     let lags = tap_lags(plant.ratio(), settings.taps);
     let (points, weights) = ErrorGrid::new(plant, lags[0])?.coarse();

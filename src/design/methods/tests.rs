@@ -1,9 +1,10 @@
 //! Tests of all methods: shapes, bounds, and the norm computed independently.
 
 use super::*;
-use crate::design::filters::{lifted, polyphase};
+use crate::design::filters::lifted;
 use crate::design::merging::Repeats;
 use crate::linalg::{self, CMat, Complex};
+use crate::lti::FirMatrix;
 use crate::spec::Spec;
 use crate::units::Seconds;
 use std::f64::consts::PI;
@@ -60,12 +61,12 @@ fn plant(case: &Case) -> LiftedPlant {
     LiftedPlant::new(&problem.merge_channels(Repeats::AtOneInstant).problem)
 }
 
-fn settings(case: &Case, method: Method) -> Settings {
+fn settings(case: &Case, method: Method) -> MethodSettings {
     let spec = spec(case, method);
     let slow = Spec { fast_period: Seconds(case.ratio as f64), ..spec };
     let at_slow_rate = Some(Problem::new(&slow, 0).unwrap().merge_channels(Repeats::AtOneInstant).problem);
     let taps = if method.has_taps() { 13 } else { 0 };
-    Settings { taps, at_slow_rate, ..Settings::default() }
+    MethodSettings { taps, at_slow_rate, ..MethodSettings::default() }
 }
 
 /// F(z) by its definition.
@@ -74,7 +75,7 @@ fn filter_response(filters: &SynthesisFilters, ratio: usize, z: Complex<f64>) ->
         SynthesisFilters::StateSpace(_) => lifted(filters, ratio).response_at(z),
         SynthesisFilters::Fir(taps) => {
             let term = |j: usize, lag: &crate::linalg::Mat| linalg::to_complex(lag) * z.powi(-(j as i32));
-            polyphase(taps, ratio).iter().enumerate().map(|(j, lag)| term(j, lag)).sum()
+            FirMatrix::polyphase(taps, ratio).lags().iter().enumerate().map(|(j, lag)| term(j, lag)).sum()
         }
     }
 }
@@ -128,7 +129,7 @@ fn every_method_keeps_the_contract() {
                 Err(error) => panic!("{}, {}: {error}", case.name, method.name()),
             }
         }
-        let taps = Settings { taps: 13, ..Settings::default() };
+        let taps = MethodSettings { taps: 13, ..MethodSettings::default() };
         check(case, Method::H2, &synthesise(Method::H2, &plant, &taps).unwrap(), &plant);
     }
 }
@@ -159,7 +160,7 @@ fn a_margin_is_spent_on_the_mean_square() {
     };
     for method in [Method::Fir, Method::Iir] {
         let tight = settings(&CASES[0], method);
-        let wide = Settings { gamma_margin: Some(0.05), ..tight.clone() };
+        let wide = MethodSettings { gamma_margin: Some(0.05), ..tight.clone() };
         let (tight, wide) =
             (synthesise(method, &plant, &tight).unwrap(), synthesise(method, &plant, &wide).unwrap());
         assert!(wide.peak.gain <= tight.peak.gain * 1.05 * (1.0 + 1e-9), "{}", method.name());
@@ -199,7 +200,7 @@ fn the_recursive_mean_square_optimum_counts_noise() {
             let problem = Problem::new(&spec, 6).unwrap().merge_channels(Repeats::of(&spec));
             let plant = LiftedPlant::new(&problem.of_unit_size().unwrap().problem);
             let of = |taps: usize| {
-                let settings = Settings { taps, ..Settings::default() };
+                let settings = MethodSettings { taps, ..MethodSettings::default() };
                 squares(&plant, &synthesise(Method::H2, &plant, &settings).unwrap().filters)
             };
             let (recursive, fir) = (of(0), of(60));
@@ -225,7 +226,7 @@ fn iir_trades_gamma_for_less_noise() {
     };
     let plant = plant(&case);
     let of = |margin: Option<f64>| {
-        let settings = Settings { gamma_margin: margin, ..settings(&case, Method::Iir) };
+        let settings = MethodSettings { gamma_margin: margin, ..settings(&case, Method::Iir) };
         let found = synthesise(Method::Iir, &plant, &settings).unwrap();
         let [error, noise, _] = squares(&plant, &found.filters);
         (found.peak.gain, error + noise)

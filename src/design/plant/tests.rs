@@ -62,7 +62,7 @@ fn the_error_system_is_w_minus_f_h() {
 fn the_response_keeps_all_products() {
     for plant in plants() {
         for omega in [0.0, 0.8, 2.2, PI] {
-            let Point { h, w, .. } = plant.at(omega);
+            let FrequencyPoint { h, w, .. } = plant.at(omega);
             assert!(h.ncols() <= plant.channels() + plant.ratio());
             let all = plant.system().response_at(Complex::from_polar(1.0, omega));
             let compressed = linalg::vstack(&[&h, &w]);
@@ -79,7 +79,7 @@ fn norms_are_those_of_dense_grids() {
             (plant.norm(&bank(&plant)).unwrap(), plant.error_system(&bank(&plant))),
             (
                 plant.fir_norm(&taps(&plant)).unwrap(),
-                plant.error_system(&StateSpace::fir(&filters::polyphase(&taps(&plant), plant.ratio()))),
+                plant.error_system(&FirMatrix::polyphase(&taps(&plant), plant.ratio()).state_space()),
             ),
         ] {
             let grid = dense_grid(&error);

@@ -1,6 +1,6 @@
 //! Searches for the proof of a worst case over a box: the diagonal D and the certificates of its two norms.
 
-use super::upper::{EXCESSES, Level, Units, certificate, in_doubles};
+use super::upper::{EXCESSES, TrialGamma, Units, certificate, in_doubles};
 use crate::bank::{Bank, BoxProof, Certificate, NormBound, Proof};
 use crate::design::DesignError;
 use crate::design::filters::FilterResponse;
@@ -91,7 +91,7 @@ fn norm_bound(system: &EnclosedSystem, stop: &Stop) -> Result<NormBound, DesignE
         if stop.is_due() {
             return Err(DesignError::Stopped);
         }
-        let level = Level { norm, excess: excess * norm };
+        let level = TrialGamma { norm, excess: excess * norm };
         let passes = |factor| {
             let bound = NormBound { norm: level.gamma() * units.reference, factor: units.factor(factor) };
             system.certifies(&bound).then_some(bound)

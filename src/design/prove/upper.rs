@@ -8,7 +8,7 @@
 use super::enclosed_norm::EnclosedGains;
 use super::{leading_direction, witness};
 use crate::arithmetic::dense::{cholesky, product, riccati_limit, select, solve, symmetric};
-use crate::arithmetic::{BigFloat, Float512, Number};
+use crate::arithmetic::{BigFloat, Float, Float512};
 use crate::bank::{Bank, Certificate, GainWitness};
 use crate::design::DesignError;
 use crate::design::limits::{MAX_LONG_STATES, Stop};
@@ -83,8 +83,8 @@ pub(super) fn certificate(
     {
         (norm, peak_witness) = (gain / units.reference, enclosed);
     }
-    let search = Search { error, units: &units, middle: &middle, peak: peak_witness };
-    let level = |excess: &f64| Level { norm, excess: excess * norm.max(floor) };
+    let search = Certifier { error, units: &units, middle: &middle, peak: peak_witness };
+    let level = |excess: &f64| TrialGamma { norm, excess: excess * norm.max(floor) };
     let mut failure = None;
     let mut in_doubles = |excess: &f64| {
         if stop.is_due() {
@@ -116,12 +116,12 @@ pub(super) fn certificate(
 
 /// A gamma that is tried.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Level {
+pub(super) struct TrialGamma {
     pub(super) norm: f64,
     pub(super) excess: f64,
 }
 
-impl Level {
+impl TrialGamma {
     /// The gamma that is proven.
     pub(super) fn gamma(self) -> f64 {
         self.norm + self.excess
@@ -134,7 +134,7 @@ impl Level {
 }
 
 /// What is certified.
-struct Search<'a> {
+struct Certifier<'a> {
     error: &'a EnclosedErrorSystem<'a>,
     units: &'a Units,
     /// The system in these units.
@@ -142,16 +142,21 @@ struct Search<'a> {
     peak: GainWitness,
 }
 
-impl Search<'_> {
+impl Certifier<'_> {
     /// The certificate of these numbers in units of one, if it proves its gamma.
-    fn passes(&self, level: Level, factor: Vec<Vec<f64>>, correction: Vec<Vec<f64>>) -> Option<Certificate> {
+    fn passes(
+        &self,
+        level: TrialGamma,
+        factor: Vec<Vec<f64>>,
+        correction: Vec<Vec<f64>>,
+    ) -> Option<Certificate> {
         let gamma = level.gamma() * self.units.reference;
         let [factor, correction] = [factor, correction].map(|rows| self.units.factor(rows));
         let found = Certificate { gamma, peak: self.peak.clone(), factor, correction };
         self.error.certifies(&found).then_some(found)
     }
 
-    fn in_doubles(&self, level: Level) -> Result<Option<Certificate>, DesignError> {
+    fn in_doubles(&self, level: TrialGamma) -> Result<Option<Certificate>, DesignError> {
         in_doubles(self.middle, level, |factor| self.passes(level, factor, Vec::new()))
     }
 
@@ -165,7 +170,7 @@ impl Search<'_> {
     }
 
     /// In numbers of so many words, R as two doubles per entry where one does not do.
-    fn of_long<const WORDS: usize>(&self, long: &LongSystem, level: Level) -> Option<Certificate> {
+    fn of_long<const WORDS: usize>(&self, long: &LongSystem, level: TrialGamma) -> Option<Certificate> {
         let noise = NOISE_SHARE_OF_EXCESS * level.excess;
         let [factor, correction] = long.root::<WORDS>(level.middle(), noise)?;
         let passes = |correction| self.passes(level, factor.clone(), correction);
@@ -177,7 +182,7 @@ impl Search<'_> {
 /// What `passes` makes of the first rows of R for `middle` that it accepts.
 pub(super) fn in_doubles<T>(
     middle: &Midpoint,
-    level: Level,
+    level: TrialGamma,
     passes: impl Fn(Vec<Vec<f64>>) -> Option<T>,
 ) -> Result<Option<T>, DesignError> {
     let noise = STATE_NOISE * (level.excess * level.gamma()).sqrt();

@@ -3,8 +3,8 @@
 //! Integers that fit few bits fit more bits, so the least loss of all integers falls with the bits, and so
 //! does the number of taps that can stay: both are found by bisection.
 
-use super::problem::Candidate;
-use super::quantiser::Quantiser;
+use super::problem::RoundedTaps;
+use super::quantiser::TapQuantiser;
 use super::{NEIGHBOURS, QuantisationProblem, WordChoice, WordStudy};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
@@ -31,7 +31,7 @@ pub(in crate::design) fn quantise_within(
     real_gamma: f64,
     allowance: &Allowance,
 ) -> Result<(FixedPoint, WordStudy), DesignError> {
-    let quantiser = Quantiser::within(problem, allowance.loss_db)?;
+    let quantiser = TapQuantiser::within(problem, allowance.loss_db)?;
     let fewest = fewest_bits(&quantiser, allowance)?;
     let more_or_fewer = NEIGHBOURS.into_iter().filter_map(|more| fewest.fixed_point.bits.widened(more));
     let beside = quantiser.quantise_all(&more_or_fewer.collect::<Vec<_>>(), None)?;
@@ -52,9 +52,9 @@ pub(in crate::design) fn quantise_within(
 
 /// Integers of the fewest bits that keep to the loss.
 fn fewest_bits(
-    quantiser: &Quantiser<'_>,
+    quantiser: &TapQuantiser<'_>,
     Allowance { loss_db, most }: &Allowance,
-) -> Result<Candidate, DesignError> {
+) -> Result<RoundedTaps, DesignError> {
     let longest = quantiser.quantise(most, None)?;
     if !quantiser.keeps(&longest) {
         let best = quantiser.mean_square_loss_db(&longest);
@@ -66,7 +66,7 @@ fn fewest_bits(
 
 /// The same bits with as many taps left out as the loss allows: those whose integers matter least, and the
 /// others chosen again.
-fn leave_out(quantiser: &Quantiser<'_>, found: &Candidate) -> Result<Candidate, DesignError> {
+fn leave_out(quantiser: &TapQuantiser<'_>, found: &RoundedTaps) -> Result<RoundedTaps, DesignError> {
     let FixedPoint { bits, integers, .. } = &found.fixed_point;
     let powers = quantiser.error.powers();
     let size = |n: usize| -> f64 {
@@ -84,11 +84,11 @@ fn leave_out(quantiser: &Quantiser<'_>, found: &Candidate) -> Result<Candidate, 
 /// Integers of the last of a sequence of word lengths that keeps to the loss, by bisection. `first`, the
 /// integers of the first, keeps to it. When the design is stopped, the last that were found.
 fn last_that_keeps(
-    quantiser: &Quantiser<'_>,
-    first: Candidate,
+    quantiser: &TapQuantiser<'_>,
+    first: RoundedTaps,
     mut open: Range<usize>,
     lengths: impl Fn(usize) -> WordLengths,
-) -> Result<Candidate, DesignError> {
+) -> Result<RoundedTaps, DesignError> {
     let mut best = first;
     while open.len() > 1 && !quantiser.error.problem.stop.is_due() {
         let middle = open.start + open.len() / 2;

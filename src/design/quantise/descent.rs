@@ -1,11 +1,11 @@
 //! Descent on gamma itself: one tap or a pair of taps changes by one step.
 
-use super::lattice::Span;
+use super::lattice::IntegerSpan;
 use crate::design::DesignError;
-use crate::design::filters::response;
 use crate::design::limits::Stop;
-use crate::linalg::{self, CMat, Complex, Mat};
-use crate::lmi::sampled::Point;
+use crate::linalg::{self, CMat, Complex};
+use crate::lmi::sampled::FrequencyPoint;
+use crate::lti::FirMatrix;
 
 /// Moves tried in pairs: those that lower the error at the worst frequency most.
 const MOVES_IN_PAIRS: usize = 48;
@@ -26,10 +26,10 @@ struct Move {
 
 /// Integer taps with the error that they leave at the points of a grid.
 pub(super) struct Descent<'a> {
-    points: &'a [Point],
+    points: &'a [FrequencyPoint],
     ratio: usize,
     step: f64,
-    spans: &'a [Span],
+    spans: &'a [IntegerSpan],
     /// One list per channel.
     integers: Vec<Vec<f64>>,
     errors: Vec<CMat>,
@@ -42,18 +42,17 @@ pub(super) struct Descent<'a> {
 }
 
 impl<'a> Descent<'a> {
-    /// Integers times `step` are the taps; `lags` are the same taps by lag, `spans` the bounds by tap.
+    /// Integers times `step` are the taps; `fir` has the same taps by lag, `spans` the bounds by tap.
     pub(super) fn new(
-        points: &'a [Point],
-        spans: &'a [Span],
+        points: &'a [FrequencyPoint],
+        spans: &'a [IntegerSpan],
         step: f64,
         integers: Vec<Vec<f64>>,
-        lags: &[Mat],
+        fir: &FirMatrix,
         real: f64,
     ) -> Result<Self, DesignError> {
-        let errors: Vec<CMat> =
-            points.iter().map(|point| point.error(&response(lags, point.omega))).collect();
-        let ratio = lags[0].nrows();
+        let errors: Vec<CMat> = points.iter().map(|point| point.error(&fir.response(point.omega))).collect();
+        let ratio = fir.shape().0;
         let (gains, order) = (Vec::new(), (0..points.len()).collect());
         let mut descent =
             Self { points, ratio, step, spans, integers, errors, gains, order, real, worst: 0.0 };

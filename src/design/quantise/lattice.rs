@@ -15,12 +15,12 @@ const LIST_LENGTH: usize = 32;
 
 /// Integers between two bounds, both included.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Span {
+pub(super) struct IntegerSpan {
     pub(super) least: f64,
     pub(super) most: f64,
 }
 
-impl Span {
+impl IntegerSpan {
     /// The range of tap `n`.
     pub(super) fn of(bits: &WordLengths, n: usize) -> Self {
         let (least, most) = bits.span(n);
@@ -52,7 +52,7 @@ struct Partial {
 /// An integer point near `centre` with a small `|L' (x - c)|^2`, L = `factor` lower triangular, x_i in
 /// `spans[i]`. It is the closest one if there is one unknown or the form is diagonal; otherwise it may not
 /// be.
-pub(super) fn closest(factor: &Mat, centre: &[f64], spans: &[Span]) -> Vec<f64> {
+pub(super) fn closest(factor: &Mat, centre: &[f64], spans: &[IntegerSpan]) -> Vec<f64> {
     let n = centre.len();
     let mut list = vec![Partial { deviations: vec![0.0; n], cost: 0.0 }];
     for i in (0..n).rev() {
@@ -72,7 +72,7 @@ fn decide<'a>(
     i: usize,
     factor: &'a Mat,
     centre: f64,
-    span: Span,
+    span: IntegerSpan,
 ) -> impl Iterator<Item = Partial> + 'a {
     let column = factor.column(i);
     let pull: f64 = (i + 1..partial.deviations.len()).map(|l| column[l] * partial.deviations[l]).sum();

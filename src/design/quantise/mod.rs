@@ -25,8 +25,8 @@ pub(super) use problem::QuantisationProblem;
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::spec::WordLengths;
-use problem::Candidate;
-use quantiser::Quantiser;
+use problem::RoundedTaps;
+use quantiser::TapQuantiser;
 
 /// Word lengths of a study, relative to the requested one.
 const NEIGHBOURS: [i32; 5] = [-2, -1, 0, 1, 2];
@@ -98,14 +98,14 @@ pub(super) fn quantise(
     bits: &WordLengths,
     fraction_bits: Option<i32>,
 ) -> Result<(FixedPoint, WordStudy), DesignError> {
-    let quantiser = Quantiser::new(problem)?;
+    let quantiser = TapQuantiser::new(problem)?;
     let all: Vec<WordLengths> = NEIGHBOURS.into_iter().filter_map(|more| bits.widened(more)).collect();
     let mut found = quantiser.quantise_all(&all, fraction_bits)?;
     // Integers that fit few bits fit more bits.
     for k in 1..found.len() {
         if found[k - 1].is_better(&found[k], problem.gamma_margin) {
             let fixed_point = FixedPoint { bits: all[k].clone(), ..found[k - 1].fixed_point.clone() };
-            found[k] = Candidate { fixed_point, ..found[k - 1] };
+            found[k] = RoundedTaps { fixed_point, ..found[k - 1] };
         }
     }
     let loss = |found| quantiser.loss(found, fraction_bits);

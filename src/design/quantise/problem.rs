@@ -11,11 +11,11 @@
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::design::error_grid::ErrorGrid;
-use crate::design::filters::{polyphase, response};
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, CMat, Complex, Mat};
-use crate::lmi::sampled::Point;
+use crate::lmi::sampled::FrequencyPoint;
+use crate::lti::FirMatrix;
 use crate::spec::{MAX_BITS, WordLengths};
 
 /// Taps to be replaced by integers times a power of two.
@@ -35,7 +35,7 @@ pub(in crate::design) struct QuantisationProblem<'a> {
 
 /// Integer taps with their error.
 #[derive(Debug, Clone)]
-pub(super) struct Candidate {
+pub(super) struct RoundedTaps {
     /// The integers with their scale.
     pub(super) fixed_point: FixedPoint,
     /// Estimate of gamma on the grid.
@@ -56,13 +56,13 @@ pub(super) struct TapError<'a> {
     pub(super) ratio: usize,
     pub(super) grid: ErrorGrid<'a>,
     /// The points of the grid.
-    pub(super) points: Vec<Point>,
+    pub(super) points: Vec<FrequencyPoint>,
     pub(super) forms: Forms,
     /// Estimate of gamma of the real taps.
     pub(super) real_gamma: f64,
     /// The least gamma that counts.
     pub(super) least_gamma: f64,
-    /// Mean square of the real taps, as in [`Candidate`].
+    /// Mean square of the real taps, as in [`RoundedTaps`].
     pub(super) real_mean_square: f64,
     /// The least mean square that counts.
     least_mean_square: f64,
@@ -75,15 +75,15 @@ impl<'a> TapError<'a> {
     /// [`DesignError::Lti`] if the plant is not stable, [`DesignError::Linalg`] if a decomposition fails.
     pub(super) fn new(problem: QuantisationProblem<'a>) -> Result<Self, DesignError> {
         let ratio = problem.plant.ratio();
-        let lags = polyphase(problem.taps, ratio);
-        let grid = ErrorGrid::new(problem.plant, lags.len())?;
+        let fir = FirMatrix::polyphase(problem.taps, ratio);
+        let grid = ErrorGrid::new(problem.plant, fir.lags().len())?;
         let points = grid.points();
         let forms = Forms::new(&points);
-        let real_gamma = grid.gamma(&lags)?;
-        let zeros = polyphase(&vec![vec![0.0; problem.taps[0].len()]; problem.taps.len()], ratio);
+        let real_gamma = grid.gamma(&fir)?;
+        let zeros = FirMatrix::polyphase(&vec![vec![0.0; problem.taps[0].len()]; problem.taps.len()], ratio);
         let least_gamma = ZERO_GAMMA * grid.gamma(&zeros)?;
         let least_mean_square = ZERO_MEAN_SQUARE * grid.mean_square(&zeros);
-        let real = grid.mean_square(&lags) + output_noise(problem.noise, problem.taps);
+        let real = grid.mean_square(&fir) + output_noise(problem.noise, problem.taps);
         let real_mean_square = real.max(least_mean_square);
         Ok(Self {
             problem,
@@ -99,12 +99,12 @@ impl<'a> TapError<'a> {
     }
 
     /// The error of integer taps.
-    pub(super) fn candidate(&self, fixed_point: FixedPoint) -> Result<Candidate, DesignError> {
+    pub(super) fn candidate(&self, fixed_point: FixedPoint) -> Result<RoundedTaps, DesignError> {
         let taps = fixed_point.taps();
-        let lags = polyphase(&taps, self.ratio);
-        let found = self.grid.mean_square(&lags) + output_noise(self.problem.noise, &taps);
+        let fir = FirMatrix::polyphase(&taps, self.ratio);
+        let found = self.grid.mean_square(&fir) + output_noise(self.problem.noise, &taps);
         let mean_square = found.max(self.least_mean_square);
-        Ok(Candidate { gamma: self.grid.gamma(&lags)?, mean_square, fixed_point })
+        Ok(RoundedTaps { gamma: self.grid.gamma(&fir)?, mean_square, fixed_point })
     }
 
     /// The mean square that a unit of each channel's tap adds.
@@ -119,10 +119,10 @@ impl<'a> TapError<'a> {
     /// [`DesignError::Linalg`] if rounding errors make the form indefinite.
     pub(super) fn taps_of_least_square(&self) -> Result<Vec<Vec<f64>>, DesignError> {
         let (problem, weights) = (self.problem, self.grid.mean_weights());
-        let lags = polyphase(problem.taps, self.ratio);
-        let errors = self.points.iter().map(|point| point.error(&response(&lags, point.omega)));
+        let fir = FirMatrix::polyphase(problem.taps, self.ratio);
+        let errors = self.points.iter().map(|point| point.error(&fir.response(point.omega)));
         let errors: Vec<CMat> = errors.collect();
-        let correlations = self.forms.correlations(&weights, lags.len());
+        let correlations = self.forms.correlations(&weights, fir.lags().len());
         let mut least = problem.taps.to_vec();
         for phase in 0..self.ratio.min(least[0].len()) {
             let taps = Tap::of_phase(phase, self, &WordLengths::Same(MAX_BITS));
@@ -145,7 +145,7 @@ impl<'a> TapError<'a> {
 
     /// Estimate of gamma of integer taps.
     pub(super) fn gamma(&self, fixed_point: &FixedPoint) -> Result<f64, DesignError> {
-        self.grid.gamma(&polyphase(&fixed_point.taps(), self.ratio))
+        self.grid.gamma(&FirMatrix::polyphase(&fixed_point.taps(), self.ratio))
     }
 }
 
@@ -200,7 +200,7 @@ pub(super) struct Correlations {
 }
 
 impl Forms {
-    pub(super) fn new(points: &[Point]) -> Self {
+    pub(super) fn new(points: &[FrequencyPoint]) -> Self {
         Self {
             omegas: points.iter().map(|point| point.omega).collect(),
             grams: points.iter().map(|point| &point.h * point.h.adjoint()).collect(),

@@ -1,8 +1,8 @@
 //! The search at the two scales in question, and the choice among its candidates.
 
-use super::lattice::Span;
-use super::problem::{Candidate, QuantisationProblem, TapError};
-use super::search::Search;
+use super::lattice::IntegerSpan;
+use super::problem::{QuantisationProblem, RoundedTaps, TapError};
+use super::search::LatticeSearch;
 use super::{WordLoss, decades};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
@@ -16,7 +16,7 @@ const LEAST_EFFECT_OF_INTEGERS: f64 = 1e-6;
 /// Real taps that lower it by more than this share have an effect, which integers should have too.
 const LEAST_EFFECT_OF_REAL_TAPS: f64 = 1e-3;
 
-impl Candidate {
+impl RoundedTaps {
     /// Whether gamma is smaller, or about equal with a smaller mean square.
     pub(super) fn is_better(&self, other: &Self, gamma_margin: f64) -> bool {
         let alike = 1.0 + gamma_margin.max(GAMMA_TIE);
@@ -26,7 +26,7 @@ impl Candidate {
 }
 
 /// The search for integers near the taps of one bank.
-pub(super) struct Quantiser<'a> {
+pub(super) struct TapQuantiser<'a> {
     pub(super) error: TapError<'a>,
     /// The mean square that integers should keep to; infinite where only gamma counts.
     most_mean_square: f64,
@@ -34,7 +34,7 @@ pub(super) struct Quantiser<'a> {
     of_least_square: Option<Vec<Vec<f64>>>,
 }
 
-impl<'a> Quantiser<'a> {
+impl<'a> TapQuantiser<'a> {
     /// Samples the plant.
     ///
     /// # Errors
@@ -62,18 +62,19 @@ impl<'a> Quantiser<'a> {
         &self,
         bits: &WordLengths,
         fraction_bits: Option<i32>,
-    ) -> Result<Candidate, DesignError> {
+    ) -> Result<RoundedTaps, DesignError> {
         let finest = fraction_bits.unwrap_or_else(|| self.finest_that_fits(bits));
         let mut found = self.candidates(bits, finest)?;
         if fraction_bits.is_none() && finest < MAX_FRACTION_BITS {
             found.extend(self.candidates(bits, finest + 1)?);
         }
-        let zero_output = self.error.candidate(Search::new(&self.error, bits, finest).zero_output())?;
+        let zero_output =
+            self.error.candidate(LatticeSearch::new(&self.error, bits, finest).zero_output())?;
         Ok(self.best(found, zero_output.gamma).unwrap_or(zero_output))
     }
 
-    fn candidates(&self, bits: &WordLengths, fraction_bits: i32) -> Result<Vec<Candidate>, DesignError> {
-        let search = Search::new(&self.error, bits, fraction_bits);
+    fn candidates(&self, bits: &WordLengths, fraction_bits: i32) -> Result<Vec<RoundedTaps>, DesignError> {
+        let search = LatticeSearch::new(&self.error, bits, fraction_bits);
         let mut found = search.run()?;
         if let Some(taps) = &self.of_least_square {
             found.push(search.near_least_square(taps)?);
@@ -83,7 +84,7 @@ impl<'a> Quantiser<'a> {
 
     /// The candidate of least mean square: of those of about the least gamma, which is not above that of
     /// zero output, that keep to the mean square that is allowed, or of all where none does.
-    fn best(&self, mut found: Vec<Candidate>, of_zero_output: f64) -> Option<Candidate> {
+    fn best(&self, mut found: Vec<RoundedTaps>, of_zero_output: f64) -> Option<RoundedTaps> {
         if found.iter().any(|found| self.keeps(found)) {
             found.retain(|found| self.keeps(found));
             let least = found.iter().map(|found| found.gamma).fold(f64::INFINITY, f64::min);
@@ -99,7 +100,7 @@ impl<'a> Quantiser<'a> {
         &self,
         all: &[WordLengths],
         fraction_bits: Option<i32>,
-    ) -> Result<Vec<Candidate>, DesignError> {
+    ) -> Result<Vec<RoundedTaps>, DesignError> {
         let found: Vec<_> = all.par_iter().map(|bits| self.quantise(bits, fraction_bits)).collect();
         found.into_iter().collect()
     }
@@ -108,7 +109,7 @@ impl<'a> Quantiser<'a> {
     ///
     /// # Errors
     /// [`DesignError::Linalg`] if a decomposition fails.
-    pub(super) fn does_nothing(&self, found: &Candidate) -> Result<bool, DesignError> {
+    pub(super) fn does_nothing(&self, found: &RoundedTaps) -> Result<bool, DesignError> {
         let fixed_point = &found.fixed_point;
         let zeros = fixed_point.integers.iter().map(|list| vec![0; list.len()]).collect();
         let zero_output = self.error.gamma(&FixedPoint { integers: zeros, ..fixed_point.clone() })?;
@@ -117,7 +118,7 @@ impl<'a> Quantiser<'a> {
     }
 
     /// Whether the mean square is as small as it should be.
-    pub(super) fn keeps(&self, found: &Candidate) -> bool {
+    pub(super) fn keeps(&self, found: &RoundedTaps) -> bool {
         found.mean_square <= self.most_mean_square
     }
 
@@ -127,7 +128,7 @@ impl<'a> Quantiser<'a> {
     /// [`DesignError::Linalg`] if a decomposition fails.
     pub(super) fn loss(
         &self,
-        found: &Candidate,
+        found: &RoundedTaps,
         fraction_bits: Option<i32>,
     ) -> Result<WordLoss, DesignError> {
         let bits = found.fixed_point.bits.clone();
@@ -145,14 +146,14 @@ impl<'a> Quantiser<'a> {
         20.0 * decades(gamma.max(least_gamma), real_gamma.max(least_gamma))
     }
 
-    pub(super) fn mean_square_loss_db(&self, found: &Candidate) -> f64 {
+    pub(super) fn mean_square_loss_db(&self, found: &RoundedTaps) -> f64 {
         10.0 * decades(found.mean_square, self.error.real_mean_square)
     }
 
     /// Estimate of gamma of the real taps, each rounded by itself at the finest scale at which all fit.
     pub(super) fn rounded(&self, bits: &WordLengths, fraction_bits: Option<i32>) -> Result<f64, DesignError> {
         let finest = fraction_bits.unwrap_or_else(|| self.finest_that_fits(bits));
-        self.error.gamma(&Search::new(&self.error, bits, finest).rounded())
+        self.error.gamma(&LatticeSearch::new(&self.error, bits, finest).rounded())
     }
 
     /// The most fraction bits, within their limits, with which each rounded tap fits its bits. Taps that are
@@ -163,10 +164,10 @@ impl<'a> Quantiser<'a> {
             filter
                 .iter()
                 .enumerate()
-                .map(|(n, &tap)| (tap, Span::of(bits, n)))
+                .map(|(n, &tap)| (tap, IntegerSpan::of(bits, n)))
                 .filter(|(tap, span)| span.reaches(*tap))
         });
-        let nonzero: Vec<(f64, Span)> = spans.collect();
+        let nonzero: Vec<(f64, IntegerSpan)> = spans.collect();
         let fits = |scale: i32| {
             let factor = f64::from(scale).exp2();
             nonzero.iter().all(|(tap, span)| span.contains((tap * factor).round_ties_even()))

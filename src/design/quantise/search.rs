@@ -1,11 +1,11 @@
 //! Integers at one scale: closest lattice points with weights on the worst frequencies, then a descent.
 
 use super::descent::Descent;
-use super::lattice::{Span, closest};
-use super::problem::{Candidate, Tap, TapError};
+use super::lattice::{IntegerSpan, closest};
+use super::problem::{RoundedTaps, Tap, TapError};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
-use crate::design::filters::polyphase;
+use crate::lti::FirMatrix;
 use crate::spec::WordLengths;
 
 /// Rounds of reweighting: with one, banks of `filters/` lose up to 2 dB more.
@@ -20,25 +20,25 @@ const NEGLIGIBLE_LOSS: f64 = 2e-5;
 type Integers = Vec<Vec<f64>>;
 
 /// The search at one scale.
-pub(super) struct Search<'a> {
+pub(super) struct LatticeSearch<'a> {
     error: &'a TapError<'a>,
     bits: &'a WordLengths,
     fraction_bits: i32,
     /// The real taps of least gamma, in units of the step.
     centre: Integers,
-    spans: Vec<Span>,
+    spans: Vec<IntegerSpan>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> LatticeSearch<'a> {
     pub(super) fn new(error: &'a TapError<'a>, bits: &'a WordLengths, fraction_bits: i32) -> Self {
         let centre = in_steps(error.problem.taps, fraction_bits);
-        let spans = (0..centre[0].len()).map(|n| Span::of(bits, n)).collect();
+        let spans = (0..centre[0].len()).map(|n| IntegerSpan::of(bits, n)).collect();
         Self { error, bits, fraction_bits, centre, spans }
     }
 
     /// All candidates: zero output, the rounded taps, those of the rounds of reweighting, and the end of a
     /// descent from the best of these.
-    pub(super) fn run(&self) -> Result<Vec<Candidate>, DesignError> {
+    pub(super) fn run(&self) -> Result<Vec<RoundedTaps>, DesignError> {
         let mut found =
             vec![self.error.candidate(self.zero_output())?, self.error.candidate(self.rounded())?];
         self.reweighted(&mut found)?;
@@ -50,7 +50,7 @@ impl<'a> Search<'a> {
 
     /// The candidate close to the real `taps` of least mean square, in which the noise of the converters
     /// counts.
-    pub(super) fn near_least_square(&self, taps: &[Vec<f64>]) -> Result<Candidate, DesignError> {
+    pub(super) fn near_least_square(&self, taps: &[Vec<f64>]) -> Result<RoundedTaps, DesignError> {
         let centre = in_steps(taps, self.fraction_bits);
         let closest = self.closest(&centre, &self.error.grid.mean_weights(), self.error.problem.noise)?;
         self.error.candidate(self.fixed_point(&closest))
@@ -59,9 +59,9 @@ impl<'a> Search<'a> {
     fn descended(&self, start: &FixedPoint) -> Result<FixedPoint, DesignError> {
         let points = &self.error.points;
         let integers = start.integers.iter().map(|list| list.iter().map(|&x| x as f64).collect()).collect();
-        let lags = polyphase(&start.taps(), self.error.ratio);
+        let fir = FirMatrix::polyphase(&start.taps(), self.error.ratio);
         let real = self.error.real_gamma;
-        let descent = Descent::new(points, &self.spans, start.step(), integers, &lags, real)?;
+        let descent = Descent::new(points, &self.spans, start.step(), integers, &fir, real)?;
         Ok(self.fixed_point(&descent.run(NEGLIGIBLE_LOSS, self.error.problem.stop)?))
     }
 
@@ -80,19 +80,19 @@ impl<'a> Search<'a> {
 
     /// Closest lattice points, with weights that grow at the frequencies where the last point was worst
     /// (Lawson).
-    fn reweighted(&self, found: &mut Vec<Candidate>) -> Result<(), DesignError> {
+    fn reweighted(&self, found: &mut Vec<RoundedTaps>) -> Result<(), DesignError> {
         let real = self.error.real_gamma;
         let mut weights = vec![1.0; self.error.points.len()];
         for _ in (0..ROUNDS).take_while(|_| !self.error.problem.stop.is_due()) {
             let candidate =
                 self.error.candidate(self.fixed_point(&self.closest(&self.centre, &weights, &[])?))?;
-            let lags = polyphase(&candidate.fixed_point.taps(), self.error.ratio);
+            let fir = FirMatrix::polyphase(&candidate.fixed_point.taps(), self.error.ratio);
             let excess_of_worst = candidate.gamma - real;
             found.push(candidate);
             if excess_of_worst <= NEGLIGIBLE_LOSS * real {
                 break;
             }
-            for (weight, gain) in weights.iter_mut().zip(self.error.grid.gains(&lags)?) {
+            for (weight, gain) in weights.iter_mut().zip(self.error.grid.gains(&fir)?) {
                 let excess = ((gain - real) / excess_of_worst).max(0.0);
                 *weight = (1.0 - REPLACED_SHARE) * *weight + REPLACED_SHARE * EMPHASIS * excess * excess;
             }
@@ -111,7 +111,7 @@ impl<'a> Search<'a> {
             let taps = Tap::of_phase(phase, self.error, self.bits);
             let at = |tap: &Tap| phase + tap.lag * ratio;
             let centre: Vec<f64> = taps.iter().map(|tap| centre[tap.channel][at(tap)]).collect();
-            let spans: Vec<Span> = taps.iter().map(|tap| self.spans[at(tap)]).collect();
+            let spans: Vec<IntegerSpan> = taps.iter().map(|tap| self.spans[at(tap)]).collect();
             let found = closest(&correlations.factor(&taps, noise)?, &centre, &spans);
             for (tap, integer) in taps.iter().zip(found) {
                 integers[tap.channel][at(tap)] = integer;

@@ -1,11 +1,11 @@
 use super::quantiser::GAMMA_TIE;
-use super::search::Search;
+use super::search::LatticeSearch;
 use super::*;
 use crate::bank::SynthesisFilters;
 use crate::design::error_grid::ErrorGrid;
-use crate::design::filters::polyphase;
 use crate::design::plant::LiftedPlant;
-use crate::design::{Options, Problem, Stop, design};
+use crate::design::{DesignOptions, Problem, Stop, design};
+use crate::lti::FirMatrix;
 use crate::spec::{MAX_FRACTION_BITS, Spec};
 use std::sync::LazyLock;
 
@@ -16,7 +16,7 @@ const THESIS: &str = include_str!("../../../filters/thesis-fir.toml");
 /// A plant with the taps of its optimal FIR bank.
 fn optimum(spec: &str) -> (LiftedPlant, Vec<Vec<f64>>) {
     let spec = Spec::from_toml(spec, "spec.toml").unwrap();
-    let found = design(&spec, &Options::without_proof()).unwrap();
+    let found = design(&spec, &DesignOptions::without_proof()).unwrap();
     let SynthesisFilters::Fir(taps) = found.bank.filters else { unreachable!() };
     (LiftedPlant::new(&Problem::new(&spec, found.bank.latency).unwrap()), taps)
 }
@@ -25,8 +25,8 @@ fn problem<'a>(plant: &'a LiftedPlant, taps: &'a [Vec<f64>]) -> QuantisationProb
     QuantisationProblem { plant, taps, noise: &[], gamma_margin: 0.0, stop: &NEVER }
 }
 
-fn quantiser<'a>(plant: &'a LiftedPlant, taps: &'a [Vec<f64>]) -> Result<Quantiser<'a>, DesignError> {
-    Quantiser::new(problem(plant, taps))
+fn quantiser<'a>(plant: &'a LiftedPlant, taps: &'a [Vec<f64>]) -> Result<TapQuantiser<'a>, DesignError> {
+    TapQuantiser::new(problem(plant, taps))
 }
 
 /// The computed norm, which does not use the grid of the search.
@@ -56,8 +56,8 @@ fn brute_force(plant: &LiftedPlant, rounded: &FixedPoint, reach: i64) -> f64 {
             inside &= (least..=most).contains(&point.integers[i][n]);
         }
         if inside {
-            let lags = polyphase(&point.taps(), plant.ratio());
-            best = best.min(ErrorGrid::new(plant, lags.len()).unwrap().gamma(&lags).unwrap());
+            let fir = FirMatrix::polyphase(&point.taps(), plant.ratio());
+            best = best.min(ErrorGrid::new(plant, fir.lags().len()).unwrap().gamma(&fir).unwrap());
         }
     }
     best
@@ -72,7 +72,7 @@ fn small_banks_reach_what_trying_all_integers_reaches() {
         let quantiser = quantiser(&plant, &taps).unwrap();
         let found = quantiser.quantise(&words, None).unwrap();
         let scale = found.fixed_point.fraction_bits;
-        let search = Search::new(&quantiser.error, &words, scale);
+        let search = LatticeSearch::new(&quantiser.error, &words, scale);
         let all = brute_force(&plant, &search.rounded(), 1);
         assert!(found.gamma <= all * 1.001, "{bits} bits: {} found, {all} is there", found.gamma);
         assert!(found.gamma <= quantiser.rounded(&words, None).unwrap() * (1.0 + GAMMA_TIE));
@@ -198,7 +198,9 @@ fn the_mean_square_decides_among_integers_of_like_gamma() {
         let found = quantiser.quantise(&WordLengths::Same(bits), None).unwrap();
         let tried = [0, 1].map(|finer| {
             let words = WordLengths::Same(bits);
-            Search::new(&quantiser.error, &words, quantiser.finest_that_fits(&words) + finer).run().unwrap()
+            LatticeSearch::new(&quantiser.error, &words, quantiser.finest_that_fits(&words) + finer)
+                .run()
+                .unwrap()
         });
         let cap = found.gamma * (1.0 + 1e-9);
         assert!(
@@ -279,10 +281,10 @@ fn the_taps_of_least_square_are_a_minimum() {
     let (plant, taps) = optimum(&THESIS.replace("taps = 22", "taps = 7"));
     let noise = [1e-3, 4e-3];
     let problem = QuantisationProblem { noise: &noise, ..problem(&plant, &taps) };
-    let quantiser = Quantiser::within(problem, 0.1).unwrap();
+    let quantiser = TapQuantiser::within(problem, 0.1).unwrap();
     let square = |taps: &[Vec<f64>]| {
         let own = taps.iter().zip(noise).map(|(f, power)| power * f.iter().map(|x| x * x).sum::<f64>());
-        quantiser.error.grid.mean_square(&polyphase(taps, 2)) + own.sum::<f64>()
+        quantiser.error.grid.mean_square(&FirMatrix::polyphase(taps, 2)) + own.sum::<f64>()
     };
     let least = quantiser.error.taps_of_least_square().unwrap();
     assert!(square(&least) < 0.99 * square(&taps));

@@ -48,7 +48,7 @@ pub(crate) struct ReductionProblem<'a> {
 
 /// The error of a bank in normalised time (h = 1).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Figures {
+pub struct ReductionErrors {
     /// gamma = ||K||, the H-infinity norm of the error system.
     pub gamma: f64,
     /// Root mean square of the error per fast sample, `||K||_2 / sqrt(M)`.
@@ -62,7 +62,7 @@ pub struct OrderErrorPoint {
     pub order: usize,
     /// The error of the best bank found with at most so many states.
     #[serde(flatten)]
-    pub figures: Figures,
+    pub figures: ReductionErrors,
     /// Excess over the full bank in decibels of the quantity that the method minimises: gamma (`iir`) or the
     /// mean-square error (`h2`).
     pub loss_db: f64,

@@ -1,8 +1,8 @@
 //! The order search: weighted truncations of the full bank, each with its best output matrices.
 
 use super::plant_samples::PlantSamples;
-use super::truncation::{Recursion, balanced, mean_square_bank};
-use super::{Aim, Figures, OrderErrorPoint, OrderReduction, ReductionProblem};
+use super::truncation::{ReducedRecursion, balanced, mean_square_bank};
+use super::{Aim, OrderErrorPoint, OrderReduction, ReductionErrors, ReductionProblem};
 use crate::design::DesignError;
 use crate::lti::StateSpace;
 use crate::lti::gramian::h2_norm;
@@ -20,7 +20,7 @@ const ZERO_ERROR: f64 = 1e-12;
 #[derive(Debug, Clone)]
 struct ReducedBank {
     bank: StateSpace,
-    figures: Figures,
+    figures: ReductionErrors,
 }
 
 /// The search along the orders.
@@ -29,7 +29,7 @@ pub(super) struct OrderSearch<'a> {
     samples: PlantSamples<'a>,
     /// All states of the full bank, balanced.
     balanced: StateSpace,
-    full: Figures,
+    full: ReductionErrors,
     banks: BTreeMap<usize, ReducedBank>,
     zero: f64,
 }
@@ -65,14 +65,14 @@ impl<'a> OrderSearch<'a> {
     }
 
     /// The quantity that the method minimises.
-    fn merit(&self, figures: &Figures) -> f64 {
+    fn merit(&self, figures: &ReductionErrors) -> f64 {
         match self.problem.aim {
             Aim::WorstCase => figures.gamma,
             Aim::MeanSquare => figures.rms_error,
         }
     }
 
-    fn loss(&self, figures: &Figures) -> f64 {
+    fn loss(&self, figures: &ReductionErrors) -> f64 {
         let size = |figures| self.merit(figures).max(self.zero);
         20.0 * (size(figures) / size(&self.full)).log10()
     }
@@ -90,14 +90,14 @@ impl<'a> OrderSearch<'a> {
     /// Finds a bank of `order` states by truncation, unless there is one.
     fn visit(&mut self, order: usize) -> Result<(), DesignError> {
         if !self.banks.contains_key(&order) {
-            let found = self.with_best_outputs(&Recursion::of(&self.balanced, order))?;
+            let found = self.with_best_outputs(&ReducedRecursion::of(&self.balanced, order))?;
             self.banks.insert(order, found);
         }
         Ok(())
     }
 
     /// The best bank with this recursion.
-    fn with_best_outputs(&self, recursion: &Recursion) -> Result<ReducedBank, DesignError> {
+    fn with_best_outputs(&self, recursion: &ReducedRecursion) -> Result<ReducedBank, DesignError> {
         let bank = match self.problem.aim {
             Aim::WorstCase => self.samples.best_bank(recursion, self.problem.gamma_margin)?,
             Aim::MeanSquare => mean_square_bank(self.problem.plant, recursion)?,
@@ -105,7 +105,7 @@ impl<'a> OrderSearch<'a> {
         Ok(ReducedBank { figures: figures(self.problem, &bank)?, bank })
     }
 
-    fn point(&self, order: usize, figures: Figures) -> OrderErrorPoint {
+    fn point(&self, order: usize, figures: ReductionErrors) -> OrderErrorPoint {
         OrderErrorPoint { order, figures, loss_db: self.loss(&figures) }
     }
 
@@ -121,8 +121,8 @@ impl<'a> OrderSearch<'a> {
 }
 
 /// The error of a bank.
-fn figures(problem: &ReductionProblem<'_>, bank: &StateSpace) -> Result<Figures, DesignError> {
+fn figures(problem: &ReductionProblem<'_>, bank: &StateSpace) -> Result<ReductionErrors, DesignError> {
     let error = problem.plant.error_system(bank);
     let gamma = hinf_norm(&error)?.gain;
-    Ok(Figures { gamma, rms_error: h2_norm(&error)? / (problem.plant.ratio() as f64).sqrt() })
+    Ok(ReductionErrors { gamma, rms_error: h2_norm(&error)? / (problem.plant.ratio() as f64).sqrt() })
 }

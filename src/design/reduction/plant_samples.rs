@@ -1,15 +1,15 @@
 //! Output matrices of least gamma for a given recursion. The error W - F H is affine in them, so that they
 //! solve a convex problem at sampled frequencies.
 
-use super::truncation::Recursion;
+use super::truncation::ReducedRecursion;
 use crate::design::DesignError;
-use crate::design::error_grid::{AffineError, LocatedPeak, Location};
+use crate::design::error_grid::{AffineError, GridFrequency, LocatedPeak};
 use crate::design::exchange::Exchange;
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
-use crate::lmi::sampled::{self, MeanSquareObjective, Point, Taps};
+use crate::lmi::sampled::{self, FrequencyPoint, MeanSquareObjective};
 use crate::lti::peak::{peaks_above, resonances, stable_poles};
-use crate::lti::{FrequencyResponse, StateSpace};
+use crate::lti::{FirMatrix, FrequencyResponse, StateSpace};
 use std::f64::consts::PI;
 
 /// Intervals of the uniform frequencies.
@@ -26,7 +26,7 @@ pub(super) struct PlantSamples<'a> {
     /// Ends each problem with the best outputs so far.
     stop: &'a Stop,
     /// The first GRID + 1 are uniform.
-    samples: Vec<Point>,
+    samples: Vec<FrequencyPoint>,
 }
 
 impl<'a> PlantSamples<'a> {
@@ -54,17 +54,17 @@ impl<'a> PlantSamples<'a> {
     /// The bank of least gamma with this recursion and, within `gamma_margin`, of least mean square.
     pub(super) fn best_bank(
         &self,
-        recursion: &Recursion,
+        recursion: &ReducedRecursion,
         gamma_margin: f64,
     ) -> Result<StateSpace, DesignError> {
         let regressors = FrequencyResponse::new(&recursion.regressors());
         let points = self.samples.iter().map(|sample| driving(&regressors, sample.clone())).collect();
-        let problem = sampled::Problem::new(points, vec![1; self.plant.ratio()]);
+        let problem = sampled::SampledProblem::new(points, vec![1; self.plant.ratio()]);
         let objective = MeanSquareObjective::noiseless(self.weights(), problem.channels());
         let error = OutputError { plant: self.plant, recursion, regressors };
         let mut exchange = Exchange::new(error, problem, std::iter::repeat(()), objective, gamma_margin);
         exchange.stop = self.stop.clone();
-        Ok(recursion.with_outputs(&exchange.optimise()?.taps[0]))
+        Ok(recursion.with_outputs(&exchange.optimise()?.taps.lags()[0]))
     }
 
     /// Trapezoidal weights of the uniform frequencies, zeros for the others.
@@ -79,24 +79,24 @@ impl<'a> PlantSamples<'a> {
 /// The error of a given recursion as a function of the output matrices.
 struct OutputError<'a> {
     plant: &'a LiftedPlant,
-    recursion: &'a Recursion,
+    recursion: &'a ReducedRecursion,
     regressors: FrequencyResponse,
 }
 
 impl AffineError for OutputError<'_> {
     type Scenario = ();
 
-    fn at(&self, location: &Location<()>) -> Point {
+    fn at(&self, location: &GridFrequency<()>) -> FrequencyPoint {
         driving(&self.regressors, self.plant.at(location.frequency))
     }
 
-    fn peaks(&self, taps: &Taps, level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
-        let error = self.plant.error_system(&self.recursion.with_outputs(&taps[0]));
+    fn peaks(&self, taps: &FirMatrix, level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
+        let error = self.plant.error_system(&self.recursion.with_outputs(&taps.lags()[0]));
         Ok(peaks_above(&error, level)?.into_iter().map(LocatedPeak::from).collect())
     }
 }
 
 /// The point with the regressors as measurements.
-fn driving(regressors: &FrequencyResponse, point: Point) -> Point {
-    Point { h: regressors.at_frequency(point.omega) * point.h, ..point }
+fn driving(regressors: &FrequencyResponse, point: FrequencyPoint) -> FrequencyPoint {
+    FrequencyPoint { h: regressors.at_frequency(point.omega) * point.h, ..point }
 }

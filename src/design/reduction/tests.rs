@@ -1,9 +1,9 @@
 use super::plant_samples::PlantSamples;
-use super::truncation::{self, Recursion, mean_square_bank};
+use super::truncation::{self, ReducedRecursion, mean_square_bank};
 use super::*;
 use crate::design::Problem;
 use crate::design::filters::lifted;
-use crate::design::methods::{Settings, synthesise};
+use crate::design::methods::{MethodSettings, synthesise};
 use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, Complex, Mat};
 use crate::lti::gramian::{balanced, h2_norm};
@@ -30,7 +30,7 @@ fn thesis(latency: usize) -> LiftedPlant {
 
 /// The full bank.
 fn bank_of(method: Method, plant: &LiftedPlant) -> StateSpace {
-    lifted(&synthesise(method, plant, &Settings::default()).unwrap().filters, plant.ratio())
+    lifted(&synthesise(method, plant, &MethodSettings::default()).unwrap().filters, plant.ratio())
 }
 
 fn problem<'a>(plant: &'a LiftedPlant, bank: &'a StateSpace, aim: Aim) -> ReductionProblem<'a> {
@@ -151,7 +151,7 @@ fn truncation_is_judged_where_the_plant_has_signal() {
     ]);
     let weighted = truncation::balanced(&plant, &full).unwrap();
     let first = |system: &StateSpace, order: usize| {
-        let recursion = Recursion::of(system, order);
+        let recursion = ReducedRecursion::of(system, order);
         let c = system.c().columns(0, order).into_owned();
         recursion.with_outputs(&linalg::hstack(&[&c, system.d()]))
     };
@@ -221,7 +221,7 @@ fn no_other_outputs_is_better() {
     let bank = bank_of(Method::Iir, &plant);
     let balanced = truncation::balanced(&plant, &bank).unwrap();
     for order in [0, 3] {
-        let recursion = Recursion::of(&balanced, order);
+        let recursion = ReducedRecursion::of(&balanced, order);
         let of_least_square = mean_square_bank(&plant, &recursion).unwrap();
         let norm = h2_norm(&error(&plant, &of_least_square)).unwrap();
         let of_least_gamma = PlantSamples::new(&plant, &NEVER).unwrap().best_bank(&recursion, 0.0).unwrap();

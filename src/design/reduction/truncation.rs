@@ -17,14 +17,14 @@ const RANK_TOLERANCE: f64 = 1e-12;
 
 /// The recursion `x+ = a x + b u`.
 #[derive(Debug, Clone)]
-pub(super) struct Recursion {
+pub(super) struct ReducedRecursion {
     /// r x r.
     a: Mat,
     /// r x N.
     b: Mat,
 }
 
-impl Recursion {
+impl ReducedRecursion {
     /// That of the first `r` states of `system`, or of all if there are fewer.
     pub(super) fn of(system: &StateSpace, r: usize) -> Self {
         let r = r.min(system.order());
@@ -62,14 +62,14 @@ fn state_covariance_root(plant: &LiftedPlant, bank: &StateSpace) -> Result<Mat, 
 /// The bank of least mean-square error with this recursion.
 pub(super) fn mean_square_bank(
     plant: &LiftedPlant,
-    recursion: &Recursion,
+    recursion: &ReducedRecursion,
 ) -> Result<StateSpace, DesignError> {
     let (x, z) = covariance_roots(plant, recursion)?;
     Ok(recursion.with_outputs(&projection(&x, &z)?))
 }
 
 /// Rows X and Z with the covariance `[X; Z] [X; Z]'` of the regressors and the reference.
-fn covariance_roots(plant: &LiftedPlant, recursion: &Recursion) -> Result<(Mat, Mat), DesignError> {
+fn covariance_roots(plant: &LiftedPlant, recursion: &ReducedRecursion) -> Result<(Mat, Mat), DesignError> {
     let driven = plant.driving(&recursion.regressors());
     let root = controllability_root(driven.a(), driven.b())?;
     let t = linalg::hstack(&[&(driven.c() * &root), driven.d()]);

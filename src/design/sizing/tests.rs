@@ -1,6 +1,6 @@
 use super::*;
 use crate::design::fir_errors::FirErrors;
-use crate::design::length::Figure;
+use crate::design::length::TargetFigure;
 use crate::design::root_covariance::RootCovariance;
 use crate::lmi::sampled;
 use crate::spec::{DesignSpec, FilterSpec};
@@ -31,7 +31,7 @@ fn a_choice_ends_with_the_design_that_was_ended() {
         }
     };
     let problem = Problem::before_sizing(&open).unwrap();
-    let refused = Sizing::new(&open, &problem, Comparison { observer: &follow, stop: &stop }).unwrap_err();
+    let refused = Sizing::new(&open, &problem, SizingControl { observer: &follow, stop: &stop }).unwrap_err();
     assert_eq!(refused, DesignError::Stopped);
 }
 
@@ -98,7 +98,7 @@ fn least_mean_square(problem: &Problem, latency: usize, taps: usize) -> f64 {
     let lags: Vec<usize> = (0..ratio).map(|p| taps.saturating_sub(p).div_ceil(ratio)).collect();
     let count = 256;
     let points = (0..=count).map(|k| plant.at(std::f64::consts::PI * k as f64 / count as f64));
-    let grid = sampled::Problem::new(points.collect(), lags);
+    let grid = sampled::SampledProblem::new(points.collect(), lags);
     let weight = |k: usize| if k == 0 || k == count { 0.5 } else { 1.0 } / count as f64;
     let weights: Vec<f64> = (0..=count).map(weight).collect();
     let square = sampled::MeanSquareObjective { weights, noise: problem.noise.clone() };
@@ -166,7 +166,7 @@ fn as_many_taps_are_chosen_as_the_snr_needs() {
 fn an_snr_that_is_out_of_reach_is_refused_with_the_best_one() {
     let open = Spec { latency: Some(9), ..spec("target_snr_db = 200, method = \"h2\", noise = 1e-3") };
     let refused = Sizing::of(&open).unwrap_err();
-    let DesignError::FigureOutOfReach { figure: Figure::Snr, wanted, best, latency } = refused else {
+    let DesignError::FigureOutOfReach { figure: TargetFigure::Snr, wanted, best, latency } = refused else {
         panic!("{refused}")
     };
     assert!(wanted == 200.0 && latency == 9 && (30.0..70.0).contains(&best), "{refused}");
@@ -220,7 +220,7 @@ fn in_band(design: &str) -> Spec {
 fn figures_of(spec: &Spec, taps: usize) -> crate::figures::Figures {
     let mut sized = spec.clone();
     sized.design = sized.design.with_taps(Some(taps));
-    let bank = crate::design::design(&sized, &crate::design::Options::without_proof()).unwrap().bank;
+    let bank = crate::design::design(&sized, &crate::design::DesignOptions::without_proof()).unwrap().bank;
     crate::figures::Figures::new(&bank).unwrap()
 }
 
@@ -238,7 +238,8 @@ fn open_taps_bring_images_below_the_noise() {
     let taps = Sizing::of(&spec).unwrap().taps;
     let below = |taps: usize| {
         let quiet = in_band(&format!("taps = {taps}"));
-        let mut bank = crate::design::design(&quiet, &crate::design::Options::without_proof()).unwrap().bank;
+        let mut bank =
+            crate::design::design(&quiet, &crate::design::DesignOptions::without_proof()).unwrap().bank;
         bank.spec = Some(Spec { channels: spec.channels.clone(), ..quiet });
         let figures = crate::figures::Figures::new(&bank).unwrap();
         -figures.image.unwrap().db.0 - figures.snr.noise_db.unwrap().0

@@ -35,7 +35,7 @@ pub(in crate::design) struct BoxPlant {
     pub(in crate::design) errors: ErrorBox,
     /// Its measurements are the samples of the nodes.
     plant: LiftedPlant,
-    nodes: Vec<Node>,
+    nodes: Vec<UncertainConverter>,
     /// The samples of each converter in a frame.
     converters: Vec<Range<usize>>,
     /// For each converter.
@@ -44,7 +44,7 @@ pub(in crate::design) struct BoxPlant {
 
 /// A converter with errors of its delay and cut-off, which all its samples share.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Node {
+struct UncertainConverter {
     channel: usize,
     delay: FastPeriods,
     cutoff: f64,
@@ -90,7 +90,12 @@ impl BoxPlant {
     }
 
     /// The first option of each channel has the errors of `centre`.
-    fn with_nodes(problem: &Problem, errors: &ErrorBox, centre: &ErrorPoint, nodes: Vec<Node>) -> Self {
+    fn with_nodes(
+        problem: &Problem,
+        errors: &ErrorBox,
+        centre: &ErrorPoint,
+        nodes: Vec<UncertainConverter>,
+    ) -> Self {
         let converters = problem.converters();
         let options = (0..converters.len())
             .map(|i| {
@@ -115,7 +120,7 @@ impl BoxPlant {
         let lifted = self.nodes.len();
         for channel in 0..self.options.len() {
             let ConverterErrors { delay, cutoff, gain } = point.of(channel);
-            let node = self.node_at(Node { channel, delay, cutoff });
+            let node = self.node_at(UncertainConverter { channel, delay, cutoff });
             let options = &mut self.options[channel];
             let known = options.iter().position(|option| option.node == node && option.gain == gain);
             if known.is_none() {
@@ -130,9 +135,9 @@ impl BoxPlant {
     }
 
     /// The index of a node, which is added unless there is one like it.
-    fn node_at(&mut self, node: Node) -> usize {
+    fn node_at(&mut self, node: UncertainConverter) -> usize {
         let (delay, cutoff) = (self.errors.delays[node.channel].0, self.errors.cutoffs[node.channel]);
-        let is_same = |other: &Node| {
+        let is_same = |other: &UncertainConverter| {
             other.channel == node.channel
                 && (other.delay - node.delay).0.abs() <= SAME_ERROR * delay
                 && (other.cutoff - node.cutoff).abs() <= SAME_ERROR * cutoff
@@ -212,7 +217,7 @@ impl BoxPlant {
         let mut point = ErrorPoint::none(self.options.len());
         for (i, &choice) in combination.iter().enumerate() {
             let ChannelError { node, gain } = self.options[i][choice];
-            let Node { delay, cutoff, .. } = self.nodes[node];
+            let UncertainConverter { delay, cutoff, .. } = self.nodes[node];
             (point.delays[i], point.gains[i], point.cutoffs[i]) = (delay, gain, cutoff);
         }
         point
@@ -251,7 +256,7 @@ impl BoxPlant {
 
     /// The rows of a node's samples.
     pub(super) fn rows(&self, node: usize) -> Range<usize> {
-        let count = |node: &Node| self.converters[node.channel].len();
+        let count = |node: &UncertainConverter| self.converters[node.channel].len();
         let first = self.nodes[..node].iter().map(count).sum();
         first..first + count(&self.nodes[node])
     }
@@ -263,10 +268,10 @@ impl BoxPlant {
 }
 
 /// The plant whose measurements are the samples of the nodes.
-fn lifted(problem: &Problem, nodes: &[Node]) -> LiftedPlant {
+fn lifted(problem: &Problem, nodes: &[UncertainConverter]) -> LiftedPlant {
     let (mut all, converters) = (problem.clone(), problem.converters());
     let mut channels = Vec::new();
-    for &Node { channel, delay, cutoff } in nodes {
+    for &UncertainConverter { channel, delay, cutoff } in nodes {
         let errors = ConverterErrors { delay, cutoff, gain: 0.0 };
         let own = &problem.channels[converters[channel].clone()];
         channels.extend(own.iter().map(|sample| all.perturb(*sample, errors)));
@@ -277,13 +282,14 @@ fn lifted(problem: &Problem, nodes: &[Node]) -> LiftedPlant {
 
 /// The nodes of all channels: at `centre`, and `offsets` of the half-widths beside it. The first node of
 /// each channel is that at the centre.
-fn nodes(errors: &ErrorBox, centre: &ErrorPoint, offsets: &[f64]) -> Vec<Node> {
+fn nodes(errors: &ErrorBox, centre: &ErrorPoint, offsets: &[f64]) -> Vec<UncertainConverter> {
     let of_channel = |channel: usize| {
         let delays = side(centre.delays[channel].0, errors.delays[channel].0, offsets);
         let cutoffs = side(centre.cutoffs[channel], errors.cutoffs[channel], offsets);
-        let node = |delay: f64, cutoff: f64| Node { channel, delay: FastPeriods(delay), cutoff };
+        let node =
+            |delay: f64, cutoff: f64| UncertainConverter { channel, delay: FastPeriods(delay), cutoff };
         let all = |delay| cutoffs.iter().map(move |&cutoff| node(delay, cutoff));
-        delays.into_iter().flat_map(all).collect::<Vec<Node>>()
+        delays.into_iter().flat_map(all).collect::<Vec<UncertainConverter>>()
     };
     (0..errors.delays.len()).flat_map(of_channel).collect()
 }

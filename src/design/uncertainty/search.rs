@@ -11,7 +11,7 @@
 use super::box_plant::{BoxPlant, BoxResponse, Combination};
 use crate::bank::SynthesisFilters;
 use crate::design::DesignError;
-use crate::design::error_grid::{Frequencies, LocatedPeak, Location, PRUNE_LEVEL};
+use crate::design::error_grid::{Frequencies, GridFrequency, LocatedPeak, PRUNE_LEVEL};
 use crate::design::filters::FilterResponse;
 use crate::linalg::{self, CMat, Complex};
 use crate::lti::peak::{Peak, local_maxima, refine};
@@ -42,7 +42,7 @@ pub(in crate::design) struct WorstErrors {
 
 /// A combination with its gain at some frequency.
 #[derive(Debug, Clone)]
-struct Found {
+struct Attained {
     gain: f64,
     combination: Combination,
 }
@@ -116,7 +116,7 @@ impl BoxSearch {
     /// The refined local maxima of what a sweep found.
     fn peaks_among(
         &self,
-        found: &[Vec<Found>],
+        found: &[Vec<Attained>],
         filters: &FilterResponse,
         level: f64,
     ) -> Result<Vec<LocatedPeak<Combination>>, DesignError> {
@@ -130,7 +130,7 @@ impl BoxSearch {
             let k = self.frequencies.all.partition_point(|omega| *omega < around[1].frequency);
             for start in self.exchanged(&found[k], k, filters)? {
                 let peak = self.refined(&start.combination, around, filters)?;
-                let location = Location { frequency: peak.frequency, scenario: start.combination };
+                let location = GridFrequency { frequency: peak.frequency, scenario: start.combination };
                 if peak.gain > level {
                     peaks.push(LocatedPeak { gain: peak.gain, location });
                 }
@@ -141,8 +141,8 @@ impl BoxSearch {
 
     /// The combinations found at each frequency, the worst first. Where the gains are below `level` some
     /// frequencies are left out.
-    fn sweep(&self, filters: &FilterResponse, level: f64) -> Result<Vec<Vec<Found>>, DesignError> {
-        let mut all: Vec<Vec<Found>> = vec![Vec::new(); self.frequencies.all.len()];
+    fn sweep(&self, filters: &FilterResponse, level: f64) -> Result<Vec<Vec<Attained>>, DesignError> {
+        let mut all: Vec<Vec<Attained>> = vec![Vec::new(); self.frequencies.all.len()];
         let mut carried = vec![vec![0; self.plant.options().len()]];
         for &k in &self.frequencies.first {
             let at = filters.at(self.frequencies.all[k]);
@@ -167,7 +167,7 @@ impl BoxSearch {
     /// Some corners of the box: those of the largest gains among [`BoxPlant::corners`].
     fn worst_corners(&self, response: &BoxResponse, filters: &CMat) -> Result<Vec<Combination>, DesignError> {
         let found = |corner: &Combination| {
-            Ok(Found { gain: self.gain(response, filters, corner)?, combination: corner.clone() })
+            Ok(Attained { gain: self.gain(response, filters, corner)?, combination: corner.clone() })
         };
         let mut corners = self.corners.iter().map(found).collect::<Result<Vec<_>, DesignError>>()?;
         corners.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -175,8 +175,13 @@ impl BoxSearch {
     }
 
     /// Where the climbs from `starts` end, the worst first.
-    fn climbed(&self, starts: Vec<Combination>, k: usize, filters: &CMat) -> Result<Vec<Found>, DesignError> {
-        let mut all: Vec<Found> = Vec::new();
+    fn climbed(
+        &self,
+        starts: Vec<Combination>,
+        k: usize,
+        filters: &CMat,
+    ) -> Result<Vec<Attained>, DesignError> {
+        let mut all: Vec<Attained> = Vec::new();
         for start in starts {
             let found = climb(&self.plant, self.response(k), filters, start)?;
             if all.iter().all(|known| known.combination != found.combination) {
@@ -191,13 +196,13 @@ impl BoxSearch {
     /// The same from `found`, where no other error of a single channel has a larger gain.
     fn exchanged(
         &self,
-        found: &[Found],
+        found: &[Attained],
         k: usize,
         filters: &FilterResponse,
-    ) -> Result<Vec<Found>, DesignError> {
+    ) -> Result<Vec<Attained>, DesignError> {
         let (response, at) = (self.response(k), filters.at(self.frequencies.all[k]));
         let mut starts = Vec::new();
-        for Found { mut gain, mut combination } in found.iter().cloned() {
+        for Attained { mut gain, mut combination } in found.iter().cloned() {
             for i in 0..combination.len() {
                 let mut best = combination[i];
                 for choice in 0..self.plant.options()[i].len() {
@@ -287,7 +292,7 @@ fn climb(
     response: &BoxResponse,
     filters: &CMat,
     mut combination: Combination,
-) -> Result<Found, DesignError> {
+) -> Result<Attained, DesignError> {
     let mut gain = 0.0;
     for _ in 0..MAX_STEPS {
         let svd = linalg::svd(&plant.error(response, filters, &combination))?;
@@ -296,33 +301,33 @@ fn climb(
         }
         gain = svd.s[0];
         let (left, right) = (svd.u.columns(0, 1).into_owned(), svd.v.columns(0, 1).into_owned());
-        let direction = Direction { samples: &response.nodes * right, filters: left.ad_mul(filters) };
+        let direction = SingularPair { samples: &response.nodes * right, filters: left.ad_mul(filters) };
         if !direction.improve(plant, &mut combination) {
             break;
         }
     }
-    Ok(Found { gain, combination })
+    Ok(Attained { gain, combination })
 }
 
 /// The largest gain of combinations of which the worst comes first.
-fn highest(found: &[Found]) -> f64 {
+fn highest(found: &[Attained]) -> f64 {
     found.first().map_or(0.0, |found| found.gain)
 }
 
 /// The first combinations.
-fn combinations(found: &[Found]) -> Vec<Combination> {
+fn combinations(found: &[Attained]) -> Vec<Combination> {
     found.iter().take(CARRIED).map(|found| found.combination.clone()).collect()
 }
 
 /// u* F and H v for the singular vectors (u, v) of an error.
-struct Direction {
+struct SingularPair {
     /// Of all nodes.
     samples: CMat,
     /// u* F.
     filters: CMat,
 }
 
-impl Direction {
+impl SingularPair {
     /// Lowers Re (u* F H v), channel by channel. Returns whether anything changed.
     fn improve(&self, plant: &BoxPlant, combination: &mut Combination) -> bool {
         let mut changed = false;

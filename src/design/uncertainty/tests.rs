@@ -4,7 +4,7 @@ use super::*;
 use crate::analog::StrictlyProper;
 use crate::bank::Bank;
 use crate::design::filters::FilterResponse;
-use crate::design::{DesignError, Options, design, norm_at};
+use crate::design::{DesignError, DesignOptions, design, norm_at};
 use crate::linalg::{self, CMat, Complex};
 use crate::random::Random;
 use crate::spec::{ErrorBox, ErrorPoint, Spec};
@@ -22,7 +22,7 @@ fn thesis() -> Bank {
 }
 
 fn bank(text: &str) -> Bank {
-    design(&Spec::from_toml(text, "spec.toml").unwrap(), &Options::without_proof()).unwrap().bank
+    design(&Spec::from_toml(text, "spec.toml").unwrap(), &DesignOptions::without_proof()).unwrap().bank
 }
 
 fn delays(half: f64) -> ErrorBox {

@@ -1,7 +1,7 @@
 //! A box of errors as it is asked for: half-widths, of one channel for all or of each.
 
 use crate::bank::Bank;
-use crate::quantity::Time;
+use crate::quantity::WrittenTime;
 use crate::spec::{ChannelCount, ErrorBox, SpecProblem, check_delay_half_width, for_channels};
 use crate::units::{FastPeriods, Seconds};
 use std::str::FromStr;
@@ -14,7 +14,7 @@ const MOST_SHARE: f64 = 0.5;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct BoxWidths {
     /// By how much the delays may be off.
-    pub delay_box: Vec<Time>,
+    pub delay_box: Vec<WrittenTime>,
     /// By which share the gains may be off.
     pub gain_box: Vec<f64>,
     /// By which share the cut-offs may be off.

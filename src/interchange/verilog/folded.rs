@@ -2,8 +2,8 @@
 //! after another, with their coefficients from a ROM; a tree adds the products of a phase, and an
 //! accumulator adds the clocks.
 
-use super::netlist::{Netlist, Term, Word, constant, wrapped};
-use super::output::Output;
+use super::netlist::{Netlist, ShiftedWord, Word, constant, wrapped};
+use super::output::OutputRounding;
 use crate::interchange::bit_true::{IntegerFilters, Range};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -47,7 +47,7 @@ pub(super) fn folded(
     filters: &IntegerFilters,
     schedule: &Schedule,
     bits: u32,
-    output: Output,
+    output: OutputRounding,
 ) -> (usize, usize) {
     write_history(netlist, filters, schedule, bits);
     let mut rom = Rom { cases: vec![String::new(); schedule.clocks], bits: 0, products: BTreeMap::new() };
@@ -66,7 +66,7 @@ pub(super) fn folded(
     let stage = sums.iter().flatten().map(|term| term.word.stage).fold(2, usize::max);
     write_control(netlist, &rom.cases, stage);
     for (p, sum) in sums.into_iter().enumerate() {
-        let sum = sum.map(|term| Term { word: netlist.at_stage(term.word, stage), ..term });
+        let sum = sum.map(|term| ShiftedWord { word: netlist.at_stage(term.word, stage), ..term });
         accumulate(netlist, filters, p, sum, stage, bits, output);
     }
     (schedule.clocks + stage + 2, rom.bits)
@@ -78,13 +78,13 @@ struct Rom {
     cases: Vec<String>,
     bits: usize,
     /// Products by the name of the sample and the coefficients. They serve all phases that have them.
-    products: BTreeMap<(String, Vec<i64>), Term>,
+    products: BTreeMap<(String, Vec<i64>), ShiftedWord>,
 }
 
 impl Rom {
     /// The products of the sample `a` with its taps at each clock, unless all are zero. What the taps have
     /// in common, a power of two or all of it, needs no ROM.
-    fn product(&mut self, netlist: &mut Netlist, a: &Word, name: &str, taps: &[i64]) -> Option<Term> {
+    fn product(&mut self, netlist: &mut Netlist, a: &Word, name: &str, taps: &[i64]) -> Option<ShiftedWord> {
         let nonzero = taps.iter().filter(|tap| **tap != 0);
         let shift = nonzero.map(|tap| tap.trailing_zeros()).min()?;
         let factors: Vec<i64> = taps.iter().map(|tap| tap >> shift).collect();
@@ -99,8 +99,8 @@ impl Rom {
                 let word = self.word(netlist, name, factors);
                 netlist.product_of(a, &word).into()
             }
-            1 => Term::from(a.clone()).scaled(0, first < 0),
-            odd => Term::from(netlist.product(a, odd.into(), 0)).scaled(0, first < 0),
+            1 => ShiftedWord::from(a.clone()).scaled(0, first < 0),
+            odd => ShiftedWord::from(netlist.product(a, odd.into(), 0)).scaled(0, first < 0),
         };
         self.products.insert(key, term.clone());
         Some(term.scaled(shift, false))
@@ -185,10 +185,10 @@ fn accumulate(
     netlist: &mut Netlist,
     filters: &IntegerFilters,
     phase: usize,
-    sum: Option<Term>,
+    sum: Option<ShiftedWord>,
     stage: usize,
     input_bits: u32,
-    output: Output,
+    output: OutputRounding,
 ) {
     let start = -i128::from(filters.constants[phase]);
     let sums = filters.sums(phase, input_bits);

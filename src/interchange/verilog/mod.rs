@@ -15,7 +15,7 @@ use super::error::ExportError;
 use crate::bank::Bank;
 use folded::{Schedule, folded};
 use netlist::Netlist;
-use output::Output;
+use output::OutputRounding;
 use parallel::parallel;
 use std::num::NonZeroU32;
 pub use testbench::MOST_RANDOM_FRAMES;
@@ -103,7 +103,7 @@ impl Verilog {
         let needed = model.needed_bits();
         let filters = &model.filters.modulo(words.accumulator);
         let mut netlist = Netlist::new(options.pipeline.get(), words.accumulator);
-        let output = Output::new(words.output, integers.fraction_bits);
+        let output = OutputRounding::new(words.output, integers.fraction_bits);
         let (clocks_per_frame, latency_clocks, rom_bits) = match options.clocks_per_frame.get() as usize {
             1 => (1, parallel(&mut netlist, filters, words.input, output), 0),
             clocks => {

@@ -28,19 +28,19 @@ impl Word {
 
 /// A word times a signed power of two, which costs nothing.
 #[derive(Debug, Clone)]
-pub(super) struct Term {
+pub(super) struct ShiftedWord {
     pub(super) word: Word,
     pub(super) shift: u32,
     pub(super) is_negative: bool,
 }
 
-impl From<Word> for Term {
+impl From<Word> for ShiftedWord {
     fn from(word: Word) -> Self {
         Self { word, shift: 0, is_negative: false }
     }
 }
 
-impl Term {
+impl ShiftedWord {
     pub(super) fn range(&self) -> Range {
         self.word.range.times(if self.is_negative { -1 } else { 1 } << self.shift)
     }
@@ -54,7 +54,7 @@ impl Term {
 }
 
 /// What a sum of two terms, or its negative, is known by.
-fn key(a: &Term, b: &Term, is_negated: bool) -> String {
+fn key(a: &ShiftedWord, b: &ShiftedWord, is_negated: bool) -> String {
     let mut parts = [a, b].map(|term| {
         let sign = if term.is_negative == is_negated { '+' } else { '-' };
         format!("{} {} {sign}", term.word.name, term.shift)
@@ -207,7 +207,7 @@ impl Netlist {
     }
 
     /// The sum of all terms by a tree of adders; the earliest ones are added first.
-    pub(super) fn sum(&mut self, mut terms: Vec<Term>) -> Option<Term> {
+    pub(super) fn sum(&mut self, mut terms: Vec<ShiftedWord>) -> Option<ShiftedWord> {
         loop {
             terms.sort_by_key(|term| std::cmp::Reverse((term.word.stage, term.word.level)));
             let first = terms.pop()?;
@@ -217,11 +217,11 @@ impl Netlist {
         }
     }
 
-    fn sum_of_two(&mut self, a: Term, b: Term) -> Term {
+    fn sum_of_two(&mut self, a: ShiftedWord, b: ShiftedWord) -> ShiftedWord {
         let stage = a.word.stage.max(b.word.stage);
         let shift = a.shift.min(b.shift);
         let is_negative = a.is_negative && b.is_negative;
-        let [a, b] = [a, b].map(|term| Term {
+        let [a, b] = [a, b].map(|term| ShiftedWord {
             word: self.at_stage(term.word, stage),
             shift: term.shift - shift,
             is_negative: term.is_negative && !is_negative,
@@ -230,10 +230,10 @@ impl Netlist {
         let range = self.held(a.range().plus(b.range()));
         let (key, negated) = (key(&a, &b, false), key(&a, &b, true));
         if let Some(word) = self.sums.get(&key) {
-            return Term { word: word.clone(), shift, is_negative };
+            return ShiftedWord { word: word.clone(), shift, is_negative };
         }
         if let Some(word) = self.sums.get(&negated) {
-            return Term { word: word.clone(), shift, is_negative: !is_negative };
+            return ShiftedWord { word: word.clone(), shift, is_negative: !is_negative };
         }
         let name = format!("sum{}", self.sums.len() + 1);
         let value = self.total(&[&a, &b], range.bits());
@@ -245,11 +245,11 @@ impl Netlist {
             Word { name, range, stage, level }
         };
         self.sums.insert(key, word.clone());
-        Term { word, shift, is_negative }
+        ShiftedWord { word, shift, is_negative }
     }
 
     /// The sum of at most two terms as an expression of so many bits.
-    pub(super) fn total(&mut self, terms: &[&Term], bits: u32) -> String {
+    pub(super) fn total(&mut self, terms: &[&ShiftedWord], bits: u32) -> String {
         let mut terms = terms.to_vec();
         terms.sort_by_key(|term| term.is_negative);
         let mut text = String::new();

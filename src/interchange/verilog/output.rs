@@ -5,14 +5,14 @@ use crate::interchange::bit_true::Range;
 
 /// How sums become outputs.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Output {
+pub(super) struct OutputRounding {
     /// Of the outputs.
     pub(super) bits: u32,
     /// Bits that are rounded away; if negative, zeros that are appended.
     fraction_bits: i32,
 }
 
-impl Output {
+impl OutputRounding {
     /// Sums have 64 bits at most, and outputs 32: beyond these limits nothing changes.
     pub(super) fn new(bits: u32, fraction_bits: i32) -> Self {
         Self { bits, fraction_bits: fraction_bits.clamp(-62, 72) }

@@ -2,8 +2,8 @@
 //! its channel, the products of one phase and lag are added by a tree, and a chain of accumulators adds the
 //! lags.
 
-use super::netlist::{Netlist, Term, Word, wrapped};
-use super::output::{Output, held_sum};
+use super::netlist::{Netlist, ShiftedWord, Word, wrapped};
+use super::output::{OutputRounding, held_sum};
 use crate::interchange::bit_true::{IntegerFilters, Range};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -13,13 +13,13 @@ pub(super) fn parallel(
     netlist: &mut Netlist,
     filters: &IntegerFilters,
     input_bits: u32,
-    output: Output,
+    output: OutputRounding,
 ) -> usize {
     let taps = &filters.taps;
     let inputs: Vec<Word> =
         (1..=taps.channels).map(|i| Word::at(0, format!("x{i}"), Range::of_bits(input_bits))).collect();
     let products: Vec<_> = inputs.iter().enumerate().map(|(i, x)| products(netlist, filters, i, x)).collect();
-    let trees: Vec<Vec<Option<Term>>> = (0..taps.ratio)
+    let trees: Vec<Vec<Option<ShiftedWord>>> = (0..taps.ratio)
         .map(|p| (0..taps.lags).map(|j| tree(netlist, filters, &products, p, j)).collect())
         .collect();
     for (x, products) in inputs.iter().zip(&products) {
@@ -28,7 +28,7 @@ pub(super) fn parallel(
         }
     }
     let stage = trees.iter().flatten().flatten().map(|term| term.word.stage).max().unwrap_or(0);
-    let mut chain = Chain { enabled: String::new(), reset: String::new(), stage };
+    let mut chain = AccumulatorChain { enabled: String::new(), reset: String::new(), stage };
     for (p, lags) in trees.into_iter().enumerate() {
         let word = chain.of_phase(netlist, filters, p, lags);
         let constant = -i128::from(filters.constants[p]);
@@ -56,7 +56,7 @@ fn products(
     filters: &IntegerFilters,
     channel: usize,
     x: &Word,
-) -> BTreeMap<u64, Term> {
+) -> BTreeMap<u64, ShiftedWord> {
     let taps = &filters.taps;
     let own = &taps.values[channel * taps.ratio * taps.lags..][..taps.ratio * taps.lags];
     // The odd parts, with the least shift of each.
@@ -75,10 +75,10 @@ fn products(
 fn tree(
     netlist: &mut Netlist,
     filters: &IntegerFilters,
-    products: &[BTreeMap<u64, Term>],
+    products: &[BTreeMap<u64, ShiftedWord>],
     phase: usize,
     lag: usize,
-) -> Option<Term> {
+) -> Option<ShiftedWord> {
     let terms = products.iter().enumerate().filter_map(|(i, products)| {
         let tap = filters.taps.get(i, phase, lag);
         let (odd, shift) = (tap != 0).then(|| odd_part(tap))?;
@@ -88,7 +88,7 @@ fn tree(
 }
 
 /// The accumulators of all phases, which take a frame when its products are there.
-struct Chain {
+struct AccumulatorChain {
     /// Assignments with a frame, and those of the reset.
     enabled: String,
     reset: String,
@@ -96,7 +96,7 @@ struct Chain {
     stage: usize,
 }
 
-impl Chain {
+impl AccumulatorChain {
     /// The sum of a phase: z_j takes z_(j+1) and the products of lag j. After the reset the history is that
     /// of samples without a signal.
     fn of_phase(
@@ -104,11 +104,11 @@ impl Chain {
         netlist: &mut Netlist,
         filters: &IntegerFilters,
         phase: usize,
-        lags: Vec<Option<Term>>,
+        lags: Vec<Option<ShiftedWord>>,
     ) -> Word {
         let taps = &filters.taps;
         let mut resting = 0;
-        let mut last: Option<Term> = None;
+        let mut last: Option<ShiftedWord> = None;
         for (j, products) in lags.into_iter().enumerate().rev() {
             if last.is_none() && products.is_none() && j > 0 {
                 continue;
@@ -116,8 +116,8 @@ impl Chain {
             let of_lag = |i: usize| i128::from(taps.get(i, phase, j)) * i128::from(filters.resting[i]);
             resting += (0..taps.channels).map(of_lag).sum::<i128>();
             let products =
-                products.map(|term| Term { word: netlist.at_stage(term.word, self.stage), ..term });
-            let terms: Vec<&Term> = last.iter().chain(&products).collect();
+                products.map(|term| ShiftedWord { word: netlist.at_stage(term.word, self.stage), ..term });
+            let terms: Vec<&ShiftedWord> = last.iter().chain(&products).collect();
             let range = terms.iter().fold(Range::from(0), |range, term| range.plus(term.range()));
             let range = netlist.held(range);
             let name = format!("z{phase}_{j}");

@@ -2,7 +2,7 @@
 //! orthogonal to every tap.
 
 use super::prepare::Reduced;
-use crate::linalg::blocks::Blocks;
+use crate::linalg::blocks::Batch;
 use crate::linalg::{self, LinalgError, Mat, Svd};
 
 /// Singular values below this, relative to the largest, count as zero.
@@ -58,7 +58,7 @@ impl Basis {
 
     /// Taps of all rows that minimise `sum_l weights_l^2 ||w_l - F h_l||_F^2`, least norm among
     /// directions weaker than `cut` times the strongest.
-    pub(super) fn least_squares(&self, reduced: &Reduced, w: &Blocks, cut: f64) -> Vec<f64> {
+    pub(super) fn least_squares(&self, reduced: &Reduced, w: &Batch, cut: f64) -> Vec<f64> {
         let mut x = vec![0.0; reduced.layout.unknowns()];
         for p in 0..reduced.layout.rows {
             let Some(svd) = self.triangle(reduced.layout.lags[p]) else { continue };
@@ -77,7 +77,7 @@ impl Basis {
 
     /// Makes each row of `y` orthogonal to the range of its taps, in two passes for the last digits. Needs a
     /// basis with unit weights.
-    pub(super) fn project_out(&self, reduced: &Reduced, y: &mut Blocks, cut: f64) {
+    pub(super) fn project_out(&self, reduced: &Reduced, y: &mut Batch, cut: f64) {
         for p in 0..reduced.layout.rows {
             let Some(svd) = self.triangle(reduced.layout.lags[p]) else { continue };
             let u = svd.u.columns(0, svd.rank(cut));
@@ -113,7 +113,7 @@ fn row_map(reduced: &Reduced, weights: &[f64], noise: &[f64]) -> Mat {
     map
 }
 
-fn row_vector(y: &Blocks, p: usize, weights: &[f64], zero_rows: usize) -> Mat {
+fn row_vector(y: &Batch, p: usize, weights: &[f64], zero_rows: usize) -> Mat {
     let (k, half) = (y.cols(), y.cols() * y.count());
     Mat::from_fn(2 * half + zero_rows, 1, |r, _| {
         if r >= 2 * half {
@@ -125,7 +125,7 @@ fn row_vector(y: &Blocks, p: usize, weights: &[f64], zero_rows: usize) -> Mat {
     })
 }
 
-fn set_row(y: &mut Blocks, p: usize, row: &Mat) {
+fn set_row(y: &mut Batch, p: usize, row: &Mat) {
     let (m, k, half) = (y.rows(), y.cols(), y.cols() * y.count());
     for l in 0..y.count() {
         let block = y.block_mut(l);

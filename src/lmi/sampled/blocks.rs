@@ -4,7 +4,7 @@
 //! if and only if `t I - G - K K*` is.
 
 use crate::linalg::Complex;
-use crate::linalg::blocks::{Block, Blocks, SmallCholesky};
+use crate::linalg::blocks::{Batch, BatchView, SmallCholesky};
 use crate::lmi::IsDue;
 
 /// Steps of the search for the boundary of the cone: each halves the bracket.
@@ -19,17 +19,17 @@ pub(super) struct Cone<'a> {
     /// `gamma^2`.
     pub(super) t: f64,
     /// M x k1.
-    pub(super) k: Blocks,
+    pub(super) k: Batch,
     /// M x M.
-    pub(super) g: Blocks,
+    pub(super) g: Batch,
     /// Dual matrices of order M + k1.
-    pub(super) z: Blocks,
+    pub(super) z: Batch,
     /// `S^{-1}`.
-    pub(super) x: Blocks,
+    pub(super) x: Batch,
     chol: SmallCholesky,
-    small: Blocks,
-    wide: Blocks,
-    full: Blocks,
+    small: Batch,
+    wide: Batch,
+    full: Batch,
     is_due: IsDue<'a>,
 }
 
@@ -37,11 +37,11 @@ pub(super) struct Cone<'a> {
 #[derive(Debug, Clone)]
 pub(super) struct SlackStep {
     pub(super) t: f64,
-    pub(super) k: Blocks,
+    pub(super) k: Batch,
 }
 
 impl<'a> Cone<'a> {
-    pub(super) fn new(t: f64, k: Blocks, g: Blocks, is_due: IsDue<'a>) -> Self {
+    pub(super) fn new(t: f64, k: Batch, g: Batch, is_due: IsDue<'a>) -> Self {
         let (count, m, k1) = (k.count(), k.rows(), k.cols());
         let order = m + k1;
         Self {
@@ -50,12 +50,12 @@ impl<'a> Cone<'a> {
             t,
             k,
             g,
-            z: Blocks::zeros(count, order, order),
-            x: Blocks::zeros(count, order, order),
+            z: Batch::zeros(count, order, order),
+            x: Batch::zeros(count, order, order),
             chol: SmallCholesky::new(order),
-            small: Blocks::zeros(1, m, m),
-            wide: Blocks::zeros(1, m, order),
-            full: Blocks::zeros(1, order, order),
+            small: Batch::zeros(1, m, m),
+            wide: Batch::zeros(1, m, order),
+            full: Batch::zeros(1, order, order),
             is_due,
         }
     }
@@ -109,12 +109,12 @@ impl<'a> Cone<'a> {
     }
 
     /// `sum_l tr Y11_l`.
-    pub(super) fn trace(&self, y: &Blocks) -> f64 {
+    pub(super) fn trace(&self, y: &Batch) -> f64 {
         (0..y.count()).map(|l| (0..self.m).map(|i| y.block(l).at(i, i).re).sum::<f64>()).sum()
     }
 
     /// `sum_l Re tr(dS_l Y_l)`.
-    pub(super) fn inner(&self, step: &SlackStep, y: &Blocks) -> f64 {
+    pub(super) fn inner(&self, step: &SlackStep, y: &Batch) -> f64 {
         let mut off = 0.0;
         for l in 0..self.count() {
             let (dk, y) = (step.k.block(l), y.block(l));
@@ -126,11 +126,11 @@ impl<'a> Cone<'a> {
     }
 
     /// `sum_l Re tr(S_l Y_l)`; with the dual matrices themselves this is the complementarity gap.
-    pub(super) fn inner_slack(&self, y: &Blocks) -> f64 {
+    pub(super) fn inner_slack(&self, y: &Batch) -> f64 {
         let mut sum = 0.0;
         for l in 0..self.count() {
             let (y, g, k) = (y.block(l), self.g.block(l), self.k.block(l));
-            let inner = |c: usize, first: usize, from: Block<'_>| -> f64 {
+            let inner = |c: usize, first: usize, from: BatchView<'_>| -> f64 {
                 (0..self.m).map(|p| (from.at(p, c).conj() * y.at(p, first + c)).re).sum()
             };
             for c in 0..self.m {
@@ -149,7 +149,7 @@ impl<'a> Cone<'a> {
     }
 
     /// `-Z - sym(X dS Z) + sigma_mu X - corrector`, the HKM dual step.
-    pub(super) fn dual_step(&self, step: &SlackStep, sigma_mu: f64, corrector: Option<&Blocks>) -> Blocks {
+    pub(super) fn dual_step(&self, step: &SlackStep, sigma_mu: f64, corrector: Option<&Batch>) -> Batch {
         let mut out = self.corrector(step, &self.z);
         for ((o, x), z) in out.as_mut_slice().iter_mut().zip(self.x.as_slice()).zip(self.z.as_slice()) {
             *o = x * sigma_mu - z - *o;
@@ -161,10 +161,10 @@ impl<'a> Cone<'a> {
     }
 
     /// `sym(X dS Y)`, with dZ for Y the second-order term of the predictor.
-    pub(super) fn corrector(&self, step: &SlackStep, y: &Blocks) -> Blocks {
+    pub(super) fn corrector(&self, step: &SlackStep, y: &Batch) -> Batch {
         let order = self.m + self.k1;
-        let [mut slack, mut product] = [(); 2].map(|()| Blocks::zeros(1, order, order));
-        let mut out = Blocks::zeros(self.count(), order, order);
+        let [mut slack, mut product] = [(); 2].map(|()| Batch::zeros(1, order, order));
+        let mut out = Batch::zeros(self.count(), order, order);
         for l in self.points() {
             fill_slack(&mut slack, self.m, step, l);
             product.block_mut(0).set_product(1.0, self.x.block(l).plain(), slack.block(0).plain());
@@ -178,7 +178,7 @@ impl<'a> Cone<'a> {
     /// Largest step, up to `most`, for which all slacks stay positive definite (to a part in 2^8).
     pub(super) fn max_primal_step(&mut self, step: &SlackStep, most: f64) -> f64 {
         let mut longest = most;
-        let mut trial = Blocks::zeros(1, self.m, self.k1);
+        let mut trial = Batch::zeros(1, self.m, self.k1);
         for l in self.points() {
             let (k, dk, g) = (self.k.block(l), step.k.block(l), self.g.block(l));
             let (small, chol, t) = (&mut self.small, &mut self.chol, self.t);
@@ -194,7 +194,7 @@ impl<'a> Cone<'a> {
     }
 
     /// Largest step, up to `most`, for which all dual matrices stay positive definite.
-    pub(super) fn max_dual_step(&mut self, dz: &Blocks, most: f64) -> f64 {
+    pub(super) fn max_dual_step(&mut self, dz: &Batch, most: f64) -> f64 {
         let mut longest = most;
         for l in self.points() {
             let (z, d) = (self.z.block(l), dz.block(l));
@@ -233,7 +233,7 @@ fn bisect(most: f64, mut inside: impl FnMut(f64) -> bool) -> f64 {
 }
 
 /// `small = t I - G - K K*`.
-fn schur(small: &mut Blocks, t: f64, g: Block<'_>, k: Block<'_>) {
+fn schur(small: &mut Batch, t: f64, g: BatchView<'_>, k: BatchView<'_>) {
     let m = g.rows;
     let data = small.as_mut_slice();
     for (s, g) in data.iter_mut().zip(g.data) {
@@ -244,7 +244,7 @@ fn schur(small: &mut Blocks, t: f64, g: Block<'_>, k: Block<'_>) {
 }
 
 /// `full = [dt I, dK; dK*, 0]`.
-fn fill_slack(full: &mut Blocks, m: usize, step: &SlackStep, l: usize) {
+fn fill_slack(full: &mut Batch, m: usize, step: &SlackStep, l: usize) {
     let order = full.rows();
     let data = full.as_mut_slice();
     data.fill(Complex::default());

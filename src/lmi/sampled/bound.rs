@@ -12,9 +12,10 @@
 
 use super::basis::Basis;
 use super::prepare::Reduced;
-use super::problem::{Point, Problem, Taps};
-use crate::linalg::blocks::Blocks;
+use super::problem::{FrequencyPoint, SampledProblem};
+use crate::linalg::blocks::Batch;
 use crate::linalg::{self, CMat, Complex, LinalgError, Mat};
+use crate::lti::FirMatrix;
 
 /// Thresholds tried between weak directions of tap space and rounding errors; the best bound counts.
 const CUTS: [f64; 3] = [1e-14, 1e-12, 1e-9];
@@ -46,7 +47,7 @@ pub(super) struct Coverage {
 /// A lower bound on the optimum of `problem` from any dual matrices, one for each point (each M x q), for
 /// all taps within `radius` (see [`Coverage`]). Uses nothing but the data and the inequality in the module's
 /// text, less an estimate of the rounding errors of the sums.
-pub(crate) fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Result<f64, LinalgError> {
+pub(crate) fn lower_bound(problem: &SampledProblem, dual: &[CMat], radius: f64) -> Result<f64, LinalgError> {
     let mut nuclear = 0.0;
     for y in dual {
         nuclear += linalg::singular_values(y)?.iter().sum::<f64>();
@@ -61,10 +62,10 @@ pub(crate) fn lower_bound(problem: &Problem, dual: &[CMat], radius: f64) -> Resu
 }
 
 /// Norm of `r_{p,i,j} / s_i` plus an estimate of its rounding error.
-fn residual_norm(problem: &Problem, dual: &[CMat]) -> f64 {
+fn residual_norm(problem: &SampledProblem, dual: &[CMat]) -> f64 {
     let unit: Vec<f64> =
         strengths(problem).into_iter().map(|s| if s > 0.0 { 1.0 / s } else { 0.0 }).collect();
-    let scaled = |point: &Point| point.h.map_with_location(|i, _, h| h * unit[i]);
+    let scaled = |point: &FrequencyPoint| point.h.map_with_location(|i, _, h| h * unit[i]);
     let scaled: Vec<CMat> = problem.points().iter().map(scaled).collect();
     let products: Vec<CMat> = dual.iter().zip(&scaled).map(|(y, h)| y * h.adjoint()).collect();
     let (lags, mut square) = (problem.max_lags(), 0.0);
@@ -82,17 +83,17 @@ fn residual_norm(problem: &Problem, dual: &[CMat]) -> f64 {
     square.sqrt() + depth * f64::EPSILON * moduli * (lags as f64).sqrt()
 }
 
-fn strengths(problem: &Problem) -> Vec<f64> {
+fn strengths(problem: &SampledProblem) -> Vec<f64> {
     let norms = |i: usize| problem.points().iter().map(move |p| p.h.row(i).norm());
     (0..problem.channels()).map(|i| norms(i).fold(0.0, f64::max)).collect()
 }
 
 /// Size of the taps, see [`Coverage`].
-fn size(problem: &Problem, taps: &Taps) -> f64 {
+fn size(problem: &SampledProblem, taps: &FirMatrix) -> f64 {
     let strength = strengths(problem);
     let square =
         |f: &Mat| -> f64 { strength.iter().enumerate().map(|(i, s)| (s * f.column(i).norm()).powi(2)).sum() };
-    taps.iter().map(square).sum::<f64>().sqrt()
+    taps.lags().iter().map(square).sum::<f64>().sqrt()
 }
 
 /// The radius for which the bound is computed. Taps with a worst case below `gamma` satisfy `sum_l ||F
@@ -100,10 +101,10 @@ fn size(problem: &Problem, taps: &Taps) -> f64 {
 /// is injective: then no others matter. Otherwise, or if that radius is very large, the radius is a large
 /// multiple of the taps found and of unit gain.
 pub(super) fn cover(
-    problem: &Problem,
+    problem: &SampledProblem,
     reduced: &Reduced,
     basis: &Basis,
-    (taps, gamma): (&Taps, f64),
+    (taps, gamma): (&FirMatrix, f64),
 ) -> Result<Coverage, LinalgError> {
     let reference = problem.points().iter().map(|p| p.w.norm()).fold(0.0, f64::max);
     let stated = RADIUS_FACTOR * size(problem, taps).max(reference);
@@ -114,7 +115,7 @@ pub(super) fn cover(
 }
 
 /// Largest growth from reduced taps to the size of taps; infinite if channels had to be dropped.
-fn mix_norm(problem: &Problem, reduced: &Reduced) -> Result<f64, LinalgError> {
+fn mix_norm(problem: &SampledProblem, reduced: &Reduced) -> Result<f64, LinalgError> {
     let strength = strengths(problem);
     if reduced.mix.nrows() < strength.iter().filter(|s| **s > 0.0).count() {
         return Ok(f64::INFINITY);
@@ -128,10 +129,10 @@ fn mix_norm(problem: &Problem, reduced: &Reduced) -> Result<f64, LinalgError> {
 /// At an optimum `Z11` sits on the worst singular vectors, and `Y = [-Z12, Z11 W_rest]` in compressed
 /// inputs is `Z11 K / gamma`, a subgradient. Its first part is made orthogonal to all taps.
 pub(super) fn from_iterate(
-    problem: &Problem,
+    problem: &SampledProblem,
     reduced: &Reduced,
     basis: &Basis,
-    z: &Blocks,
+    z: &Batch,
     coverage: Coverage,
 ) -> Result<LowerBound, LinalgError> {
     let mut value = 0.0;
@@ -142,15 +143,15 @@ pub(super) fn from_iterate(
     Ok(LowerBound { value, covers_all: coverage.is_all })
 }
 
-fn dual_matrices(reduced: &Reduced, basis: &Basis, z: &Blocks, cut: f64) -> Vec<CMat> {
+fn dual_matrices(reduced: &Reduced, basis: &Basis, z: &Batch, cut: f64) -> Vec<CMat> {
     let (m, k1, k2) = (reduced.layout.rows, reduced.h.cols(), reduced.w_rest.cols());
-    let mut image = Blocks::zeros(z.count(), m, k1);
+    let mut image = Batch::zeros(z.count(), m, k1);
     for l in 0..z.count() {
         let (from, to) = (z.block(l), image.block_mut(l).data);
         (0..m * k1).for_each(|e| to[e] = -from.at(e % m, m + e / m));
     }
     basis.project_out(reduced, &mut image, cut);
-    let mut rest = Blocks::zeros(1, m, k2);
+    let mut rest = Batch::zeros(1, m, k2);
     let full = |l: usize| {
         let weight = z.block(l).part(0, 0, m, m);
         rest.block_mut(0).set_product(1.0, weight.plain(), reduced.w_rest.block(l).plain());

@@ -1,17 +1,17 @@
 //! Sums over the points with the phases of the lags, as real matrix products.
 
-use crate::linalg::blocks::Blocks;
+use crate::linalg::blocks::Batch;
 use crate::linalg::{Complex, Mat};
 
 /// Cosines (rows 0..L) and sines (rows L..2L) of `omega_l k`, k = 0 .. 2J-2.
 #[derive(Debug, Clone)]
-pub(super) struct Phases {
+pub(super) struct LagPhasors {
     table: Mat,
     count: usize,
     lags: usize,
 }
 
-impl Phases {
+impl LagPhasors {
     /// For the frequencies `omega` and lags 0 .. `lags - 1`.
     pub(super) fn new(omega: &[f64], lags: usize) -> Self {
         let count = omega.len();
@@ -38,7 +38,7 @@ impl Phases {
         data * self.table.columns(0, lags)
     }
 
-    /// The cosine and the sine part of [`Phases::sum`] apart: their sum belongs to the lag k, their
+    /// The cosine and the sine part of [`LagPhasors::sum`] apart: their sum belongs to the lag k, their
     /// difference to -k.
     pub(super) fn split_sum(&self, data: &Mat, lags: usize) -> (Mat, Mat) {
         let part = |first| data.columns(first, self.count) * self.table.view((first, 0), (self.count, lags));
@@ -46,7 +46,7 @@ impl Phases {
     }
 
     /// `Re sum_l e^{+i omega_l k} e_l` for every entry of the blocks, as an (entries x lags) matrix.
-    pub(super) fn adjoint_sum(&self, e: &Blocks) -> Mat {
+    pub(super) fn adjoint_sum(&self, e: &Batch) -> Mat {
         let size = e.rows() * e.cols();
         let entry = |r: usize, l: usize| e.as_slice()[l * size + r];
         let data = Mat::from_fn(size, 2 * self.count, |r, c| {
@@ -56,7 +56,7 @@ impl Phases {
     }
 
     /// `out_l = sum_k e^{-i omega_l k} coefficients[:, k]`, entry by entry.
-    pub(super) fn response(&self, coefficients: &Mat, out: &mut Blocks) {
+    pub(super) fn response(&self, coefficients: &Mat, out: &mut Batch) {
         let size = out.rows() * out.cols();
         let values = coefficients * self.table.columns(0, self.lags).transpose();
         for l in 0..self.count {

@@ -9,7 +9,7 @@ use super::newton::{self, ChannelProjection};
 use super::prepare::Reduced;
 use super::quadratic::Quadratic;
 use crate::linalg::Mat;
-use crate::linalg::blocks::Blocks;
+use crate::linalg::blocks::Batch;
 use crate::lmi::IsDue;
 use crate::lmi::factor::RegularisedCholesky;
 use crate::lmi::iteration::{self, StepLengths, centering};
@@ -28,7 +28,7 @@ pub(super) enum Objective {
 const STARTING_GAP: f64 = 0.1;
 
 /// The iterate.
-pub(super) struct Engine<'a> {
+pub(super) struct InteriorIterate<'a> {
     reduced: &'a Reduced,
     objective: Objective,
     /// The unknown taps in reduced coordinates.
@@ -39,12 +39,12 @@ pub(super) struct Engine<'a> {
 }
 
 /// A direction: taps, slack and dual matrices.
-struct Direction {
+struct NewtonDirection {
     taps: Vec<f64>,
     slack: SlackStep,
 }
 
-impl<'a> Engine<'a> {
+impl<'a> InteriorIterate<'a> {
     /// Starts at the taps `x` with `t`, which must be above every `sigma_max(K_l)^2`; `None` otherwise.
     pub(super) fn new(
         reduced: &'a Reduced,
@@ -93,9 +93,9 @@ impl<'a> Engine<'a> {
     }
 
     /// `A*(Y)`: derivative of `sum <S_l, Y_l>` in the unknowns.
-    fn adjoint(&self, y: &Blocks) -> Vec<f64> {
+    fn adjoint(&self, y: &Batch) -> Vec<f64> {
         let (m, k1) = (self.cone.m, self.cone.k1);
-        let mut off = Blocks::zeros(y.count(), m, k1);
+        let mut off = Batch::zeros(y.count(), m, k1);
         for l in 0..y.count() {
             let block = y.block(l);
             let to = off.block_mut(l).data;
@@ -131,12 +131,12 @@ impl<'a> Engine<'a> {
         RegularisedCholesky::new(matrix).ok()
     }
 
-    fn direction(&self, newton: &RegularisedCholesky, rhs: &[f64]) -> Direction {
+    fn direction(&self, newton: &RegularisedCholesky, rhs: &[f64]) -> NewtonDirection {
         let mut taps = newton.solve(rhs);
         let t = if self.free_t() { taps.pop().unwrap_or(0.0) } else { 0.0 };
         let mut k = self.reduced.image(&taps);
         k.as_mut_slice().iter_mut().for_each(|z| *z = -*z);
-        Direction { taps, slack: SlackStep { t, k } }
+        NewtonDirection { taps, slack: SlackStep { t, k } }
     }
 
     /// One step; `None` if rounding errors prevent it or its end is due. The iterate changes only if all
@@ -170,14 +170,14 @@ impl<'a> Engine<'a> {
 
     /// Step lengths to the boundary. With a quadratic objective the dual residual moves with the taps, so
     /// both take the shorter one.
-    fn max_steps(&mut self, d: &Direction, dz: &Blocks, most: f64) -> StepLengths {
+    fn max_steps(&mut self, d: &NewtonDirection, dz: &Batch, most: f64) -> StepLengths {
         let primal = self.cone.max_primal_step(&d.slack, most);
         let dual = self.cone.max_dual_step(dz, most);
         let both = primal.min(dual);
         if self.free_t() { StepLengths { primal, dual } } else { StepLengths { primal: both, dual: both } }
     }
 
-    fn gap_after(&self, gap: f64, d: &Direction, dz: &Blocks, length: StepLengths) -> f64 {
+    fn gap_after(&self, gap: f64, d: &NewtonDirection, dz: &Batch, length: StepLengths) -> f64 {
         // <S, dZ> = <S, Z + dZ> - <S, Z>, and S itself is linear in (t, K) up to its constant part.
         let slack_dz = self.cone.inner_slack(dz);
         gap + length.primal * self.cone.inner(&d.slack, &self.cone.z)
@@ -185,7 +185,7 @@ impl<'a> Engine<'a> {
             + length.primal * length.dual * self.cone.inner(&d.slack, dz)
     }
 
-    fn advance(&mut self, d: &Direction, dz: &Blocks, length: StepLengths) -> Option<()> {
+    fn advance(&mut self, d: &NewtonDirection, dz: &Batch, length: StepLengths) -> Option<()> {
         let finite = d.taps.iter().all(|v| v.is_finite()) && d.slack.t.is_finite();
         if !finite || !length.make_progress() {
             return None;

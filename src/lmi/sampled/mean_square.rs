@@ -5,20 +5,21 @@
 //! those of least mean square have small errors at all frequencies.
 
 use super::basis::Basis;
-use super::interior::{Engine, Objective};
+use super::interior::{InteriorIterate, Objective};
 use super::prepare::Reduced;
-use super::problem::{MeanSquareObjective, Point, Problem, Taps};
+use super::problem::{FrequencyPoint, MeanSquareObjective, SampledProblem};
 use super::quadratic::Quadratic;
 use crate::linalg::LinalgError;
 use crate::lmi::IsDue;
 use crate::lmi::factor::RegularisedCholesky;
 use crate::lmi::iteration::{self, Iterate, RANK_TOLERANCE};
+use crate::lti::FirMatrix;
 
 /// Taps of least mean square under a cap.
 #[derive(Debug, Clone)]
-pub struct MeanSquare {
+pub struct CappedMeanSquare {
     /// `F_j`, M x N for each lag.
-    pub taps: Taps,
+    pub taps: FirMatrix,
     /// The secondary objective of these taps.
     pub mean_square: f64,
     /// Lower bound on it for any taps under the cap, from the dual iterate (valid up to rounding).
@@ -36,10 +37,10 @@ const WAY_TO_CAP: f64 = 0.999;
 /// Taps that minimise the secondary objective, by a QR factorisation (never by normal equations); least norm
 /// among directions weaker than `tol_rank` times the strongest.
 pub(crate) fn least_squares(
-    problem: &Problem,
+    problem: &SampledProblem,
     square: &MeanSquareObjective,
     tol_rank: f64,
-) -> Result<Taps, LinalgError> {
+) -> Result<FirMatrix, LinalgError> {
     let reduced = Reduced::new(problem)?;
     if reduced.layout.unknowns() == 0 {
         return Ok(problem.zero_taps());
@@ -57,16 +58,16 @@ pub(crate) fn least_squares(
 /// The result is never worse than the start, and satisfies the cap, however the iteration ended; when
 /// the end `is_due`, it is the best so far.
 pub fn mean_square_under_cap(
-    problem: &Problem,
+    problem: &SampledProblem,
     square: &MeanSquareObjective,
     cap: f64,
-    start: &Taps,
+    start: &FirMatrix,
     tol_gap_rel: f64,
     is_due: IsDue<'_>,
-) -> Result<Option<MeanSquare>, LinalgError> {
+) -> Result<Option<CappedMeanSquare>, LinalgError> {
     let free = least_squares(problem, square, RANK_TOLERANCE)?;
     let free_square = problem.mean_square(&free, square);
-    let mut best = Best::new(problem, square, cap, start)?;
+    let mut best = BestCapped::new(problem, square, cap, start)?;
     best.offer(free)?;
     if best.mean_square == free_square {
         return Ok(Some(best.finish(free_square, 0)));
@@ -81,43 +82,43 @@ pub fn mean_square_under_cap(
     let quadratic = Quadratic::new(&reduced, square, start, cap, unit);
     let zero = vec![0.0; reduced.layout.unknowns()];
     let curvature = RegularisedCholesky::new(quadratic.curvature(&reduced));
-    let engine = Engine::new(&reduced, Objective::MeanSquare(quadratic), zero, 1.0, is_due);
+    let engine = InteriorIterate::new(&reduced, Objective::MeanSquare(quadratic), zero, 1.0, is_due);
     let (Some(engine), Ok(curvature)) = (engine, curvature) else {
         return Ok(Some(best.finish(free_square, 0)));
     };
-    let mut run = Run { engine, curvature };
+    let mut run = CappedIteration { engine, curvature };
     let (_, iterations) = iteration::run(&mut run, tol_gap_rel, is_due)?;
     let step = reduced.taps(&run.engine.x);
-    let found = start.iter().zip(step).map(|(f, d)| f + d * cap).collect();
+    let found = start.lags().iter().zip(step.lags()).map(|(f, d)| f + d * cap).collect();
     best.offer(best.within_cap(found)?)?;
     let lower = (best.mean_square - run.duality_gap() * (unit * cap * cap)).max(free_square);
     Ok(Some(best.finish(lower, iterations)))
 }
 
 /// The problem with the error of `start` as its reference.
-fn residual_problem(problem: &Problem, start: &Taps) -> Problem {
+fn residual_problem(problem: &SampledProblem, start: &FirMatrix) -> SampledProblem {
     let point = |l: usize| {
         let p = &problem.points()[l];
-        Point { omega: p.omega, w: problem.error_at(l, start), h: p.h.clone() }
+        FrequencyPoint { omega: p.omega, w: problem.error_at(l, start), h: p.h.clone() }
     };
-    Problem::new((0..problem.points().len()).map(point).collect(), problem.lags().to_vec())
+    SampledProblem::new((0..problem.points().len()).map(point).collect(), problem.lags().to_vec())
 }
 
-struct Best<'a> {
-    problem: &'a Problem,
+struct BestCapped<'a> {
+    problem: &'a SampledProblem,
     square: &'a MeanSquareObjective,
     cap: f64,
-    taps: Taps,
+    taps: FirMatrix,
     mean_square: f64,
     gamma: f64,
 }
 
-impl<'a> Best<'a> {
+impl<'a> BestCapped<'a> {
     fn new(
-        problem: &'a Problem,
+        problem: &'a SampledProblem,
         square: &'a MeanSquareObjective,
         cap: f64,
-        start: &Taps,
+        start: &FirMatrix,
     ) -> Result<Self, LinalgError> {
         let gamma = problem.worst(start)?;
         let mean_square = problem.mean_square(start, square);
@@ -125,7 +126,7 @@ impl<'a> Best<'a> {
     }
 
     /// Takes the taps if they respect the cap and improve.
-    fn offer(&mut self, taps: Taps) -> Result<(), LinalgError> {
+    fn offer(&mut self, taps: FirMatrix) -> Result<(), LinalgError> {
         let mean_square = self.problem.mean_square(&taps, self.square);
         let gamma = self.problem.worst(&taps)?;
         if gamma <= self.cap && (mean_square < self.mean_square || self.gamma > self.cap) {
@@ -136,28 +137,28 @@ impl<'a> Best<'a> {
 
     /// The taps, or, if rounding has put them beyond the cap, ones on the way to them from the best so far.
     /// Gamma and the objective are convex, so what lies between is under the cap and an improvement.
-    fn within_cap(&self, taps: Taps) -> Result<Taps, LinalgError> {
+    fn within_cap(&self, taps: FirMatrix) -> Result<FirMatrix, LinalgError> {
         let gamma = self.problem.worst(&taps)?;
         if gamma <= self.cap || self.gamma >= self.cap {
             return Ok(taps);
         }
         let share = WAY_TO_CAP * (self.cap - self.gamma) / (gamma - self.gamma);
-        Ok(self.taps.iter().zip(taps).map(|(own, taps)| own + (taps - own) * share).collect())
+        Ok(self.taps.lags().iter().zip(taps.lags()).map(|(own, taps)| own + (taps - own) * share).collect())
     }
 
-    fn finish(self, lower: f64, iterations: usize) -> MeanSquare {
+    fn finish(self, lower: f64, iterations: usize) -> CappedMeanSquare {
         let Self { taps, mean_square, gamma, .. } = self;
-        MeanSquare { taps, mean_square, lower: lower.min(mean_square), gamma, iterations }
+        CappedMeanSquare { taps, mean_square, lower: lower.min(mean_square), gamma, iterations }
     }
 }
 
-struct Run<'a> {
-    engine: Engine<'a>,
+struct CappedIteration<'a> {
+    engine: InteriorIterate<'a>,
     /// Q, the second derivative of the objective.
     curvature: RegularisedCholesky,
 }
 
-impl Run<'_> {
+impl CappedIteration<'_> {
     /// `<S, Z> + r' Q^{-1} r / 2` with the dual residual r: how far the Lagrangian's minimum lies below the
     /// objective, whether or not the dual equality holds.
     fn duality_gap(&self) -> f64 {
@@ -167,7 +168,7 @@ impl Run<'_> {
     }
 }
 
-impl Iterate for Run<'_> {
+impl Iterate for CappedIteration<'_> {
     fn gap(&mut self) -> f64 {
         self.duality_gap() / self.engine.value().max(f64::MIN_POSITIVE)
     }

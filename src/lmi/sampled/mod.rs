@@ -32,17 +32,19 @@
 //! ```
 //! use hybank::linalg::{CMat, Complex};
 //! use hybank::lmi::FINEST_GAP;
-//! use hybank::lmi::sampled::{MeanSquareObjective, Point, Problem, mean_square_under_cap, minimise};
+//! use hybank::lmi::sampled::{
+//!     FrequencyPoint, MeanSquareObjective, SampledProblem, mean_square_under_cap, minimise,
+//! };
 //! // Three taps F that undo an echo of half the size: the least maximum of |1 - F (1 + z^-1 / 2)| is 1/8.
 //! let scalar = |x| CMat::from_element(1, 1, x);
 //! let point = |l: u32| {
 //!     let omega = f64::from(l) * std::f64::consts::PI / 32.0;
-//!     Point { omega, w: scalar(Complex::ONE), h: scalar(1.0 + 0.5 * Complex::cis(-omega)) }
+//!     FrequencyPoint { omega, w: scalar(Complex::ONE), h: scalar(1.0 + 0.5 * Complex::cis(-omega)) }
 //! };
-//! let problem = Problem::new((0..=32).map(point).collect(), vec![3]);
+//! let problem = SampledProblem::new((0..=32).map(point).collect(), vec![3]);
 //! let best = minimise(&problem, FINEST_GAP, &|| false)?;
 //! assert!((best.gamma - 0.125).abs() < 1e-8 && best.lower.value <= best.gamma);
-//! assert!((best.taps[1][(0, 0)] + 0.5).abs() < 1e-6);
+//! assert!((best.taps.lags()[1][(0, 0)] + 0.5).abs() < 1e-6);
 //! // A looser cap on the maximum gives a smaller mean square.
 //! let (square, cap) = (MeanSquareObjective::noiseless(vec![1.0 / 33.0; 33], 1), 1.1 * best.gamma);
 //! let found = mean_square_under_cap(&problem, &square, cap, &best.taps, FINEST_GAP, &|| false)?;
@@ -69,7 +71,6 @@ pub use bound::LowerBound;
 pub(crate) use bound::lower_bound;
 #[cfg(test)]
 pub(crate) use mean_square::least_squares;
-pub use mean_square::{MeanSquare, mean_square_under_cap};
-pub(crate) use problem::response;
-pub use problem::{MeanSquareObjective, Point, Problem, Taps};
+pub use mean_square::{CappedMeanSquare, mean_square_under_cap};
+pub use problem::{FrequencyPoint, MeanSquareObjective, SampledProblem};
 pub use worst_case::{Solution, minimise};

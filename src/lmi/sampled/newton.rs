@@ -8,25 +8,25 @@
 //!  + e^{-i w (j+j')} ( Xvu[i,p'] Zvu[i',p] + Xvu[i',p] Zvu[i,p'] ).
 //! ```
 
-use super::fourier::{Layout, Phases};
+use super::fourier::{LagPhasors, Layout};
 use super::prepare::Reduced;
-use crate::linalg::blocks::{Block, Blocks, inner};
+use crate::linalg::blocks::{Batch, BatchView, inner};
 use crate::linalg::{Complex, Mat};
 
 /// A family of Hermitian matrices, projected on the rows (u) and channels (v).
 #[derive(Debug, Clone)]
 pub(super) struct ChannelProjection {
-    pub(super) uu: Blocks,
-    pub(super) vu: Blocks,
-    pub(super) vv: Blocks,
+    pub(super) uu: Batch,
+    pub(super) vu: Batch,
+    pub(super) vv: Batch,
 }
 
 impl ChannelProjection {
     /// Projects the blocks `x` of order m + k through the channels `h` (n x k).
-    pub(super) fn new(x: &Blocks, h: &Blocks) -> Self {
+    pub(super) fn new(x: &Batch, h: &Batch) -> Self {
         let (count, n, k, m) = (x.count(), h.rows(), h.cols(), x.rows() - h.cols());
-        let (mut uu, mut vu) = (Blocks::zeros(count, m, m), Blocks::zeros(count, n, m));
-        let (mut vv, mut half) = (Blocks::zeros(count, n, n), Blocks::zeros(1, n, k));
+        let (mut uu, mut vu) = (Batch::zeros(count, m, m), Batch::zeros(count, n, m));
+        let (mut vv, mut half) = (Batch::zeros(count, n, n), Batch::zeros(1, n, k));
         for l in 0..count {
             let (full, h) = (x.block(l), h.block(l));
             copy(full.part(0, 0, m, m), uu.block_mut(l).data);
@@ -38,7 +38,7 @@ impl ChannelProjection {
     }
 }
 
-fn copy(from: Block<'_>, to: &mut [Complex<f64>]) {
+fn copy(from: BatchView<'_>, to: &mut [Complex<f64>]) {
     for j in 0..from.cols {
         for i in 0..from.rows {
             to[i + j * from.rows] = from.at(i, j);
@@ -50,7 +50,7 @@ fn copy(from: Block<'_>, to: &mut [Complex<f64>]) {
 pub(super) fn add_taps(
     matrix: &mut Mat,
     layout: &Layout,
-    phases: &Phases,
+    phases: &LagPhasors,
     x: &ChannelProjection,
     z: &ChannelProjection,
 ) {
@@ -79,9 +79,9 @@ pub(super) fn add_taps(
 }
 
 struct ProjectionAt<'a> {
-    uu: Block<'a>,
-    vu: Block<'a>,
-    vv: Block<'a>,
+    uu: BatchView<'a>,
+    vu: BatchView<'a>,
+    vv: BatchView<'a>,
 }
 
 impl<'a> ProjectionAt<'a> {
@@ -99,8 +99,8 @@ fn put(data: &mut Mat, r: usize, l: usize, count: usize, z: Complex<f64>) {
 /// `Re sum_l tr(Xuu Zuu)`.
 pub(super) fn border(reduced: &Reduced, x: &ChannelProjection, z: &ChannelProjection) -> (Vec<f64>, f64) {
     let (n, m) = (reduced.layout.channels, reduced.layout.rows);
-    let mut mixed = Blocks::zeros(1, n, m);
-    let mut e = Blocks::zeros(reduced.count(), m, n);
+    let mut mixed = Batch::zeros(1, n, m);
+    let mut e = Batch::zeros(reduced.count(), m, n);
     let mut corner = 0.0;
     for l in 0..reduced.count() {
         let (xl, zl) = (ProjectionAt::new(x, l), ProjectionAt::new(z, l));
@@ -118,12 +118,12 @@ pub(super) fn border(reduced: &Reduced, x: &ChannelProjection, z: &ChannelProjec
 pub(super) fn add_mean_square(
     matrix: &mut Mat,
     layout: &Layout,
-    phases: &Phases,
-    h: &Blocks,
+    phases: &LagPhasors,
+    h: &Batch,
     weights: &[f64],
 ) {
     let (n, count) = (layout.channels, h.count());
-    let mut gram = Blocks::zeros(1, n, n);
+    let mut gram = Batch::zeros(1, n, n);
     let mut data = Mat::zeros(n * n, 2 * count);
     for (l, weight) in weights.iter().enumerate() {
         gram.block_mut(0).set_product(2.0 * weight, h.block(l).plain(), h.block(l).adjoint());
@@ -136,7 +136,7 @@ pub(super) fn add_mean_square(
     }
 }
 
-fn add_toeplitz(matrix: &mut Mat, layout: &Layout, phases: &Phases, (p, p2): (usize, usize), data: &Mat) {
+fn add_toeplitz(matrix: &mut Mat, layout: &Layout, phases: &LagPhasors, (p, p2): (usize, usize), data: &Mat) {
     let n = layout.channels;
     let (jp, jp2) = (layout.lags[p], layout.lags[p2]);
     let (even, odd) = phases.split_sum(data, jp.max(jp2));
@@ -148,7 +148,7 @@ fn add_toeplitz(matrix: &mut Mat, layout: &Layout, phases: &Phases, (p, p2): (us
     assert_eq!(data.nrows(), n * n);
 }
 
-fn add_hankel(matrix: &mut Mat, layout: &Layout, phases: &Phases, (p, p2): (usize, usize), data: &Mat) {
+fn add_hankel(matrix: &mut Mat, layout: &Layout, phases: &LagPhasors, (p, p2): (usize, usize), data: &Mat) {
     let lags = (layout.lags[p] + layout.lags[p2]).max(1) - 1;
     let sums = phases.sum(data, lags);
     each_pair(layout, (p, p2), |row, col, j, j2, r| matrix[(row, col)] += sums[(r, j + j2)]);

@@ -1,10 +1,11 @@
 //! The problem of the iteration: inputs compressed at each point, channels mixed to equal strength without
 //! correlation.
 
-use super::fourier::{Layout, Phases};
-use super::problem::{Problem, Taps};
-use crate::linalg::blocks::Blocks;
+use super::fourier::{LagPhasors, Layout};
+use super::problem::SampledProblem;
+use crate::linalg::blocks::Batch;
 use crate::linalg::{self, CMat, LinalgError, Mat};
+use crate::lti::FirMatrix;
 
 /// Singular values of the row-normalised channels below this are rounding errors; their directions are
 /// dropped.
@@ -14,29 +15,29 @@ const CHANNEL_RANK: f64 = 1e-14;
 #[derive(Debug, Clone)]
 pub(super) struct Reduced {
     /// Mixed channels, n x k1.
-    pub(super) h: Blocks,
+    pub(super) h: Batch,
     /// The reference in the inputs that the channels measure, M x k1.
-    pub(super) w: Blocks,
+    pub(super) w: Batch,
     /// The reference in the other inputs, M x k2; the taps do not act on it.
-    pub(super) w_rest: Blocks,
+    pub(super) w_rest: Batch,
     /// `w_rest w_rest*`, M x M.
-    pub(super) g: Blocks,
+    pub(super) g: Batch,
     /// Orthonormal rows (k1 + k2) x q at each point: the original inputs of the compressed ones.
     pub(super) inputs: Vec<CMat>,
     /// n x N: `H_l Q_l* = ` original channels, mixed by `mix`; taps = reduced taps times `mix`.
     pub(super) mix: Mat,
     pub(super) layout: Layout,
-    pub(super) phases: Phases,
+    pub(super) phases: LagPhasors,
 }
 
 impl Reduced {
-    pub(super) fn new(problem: &Problem) -> Result<Self, LinalgError> {
+    pub(super) fn new(problem: &SampledProblem) -> Result<Self, LinalgError> {
         let (m, n, q) = (problem.rows(), problem.channels(), problem.inputs());
         let count = problem.points().len();
         let (k1, k) = (n.min(q), (m + n).min(q));
-        let mut channels = Blocks::zeros(count, n, k1);
-        let mut w = Blocks::zeros(count, m, k1);
-        let mut w_rest = Blocks::zeros(count, m, k - k1);
+        let mut channels = Batch::zeros(count, n, k1);
+        let mut w = Batch::zeros(count, m, k1);
+        let mut w_rest = Batch::zeros(count, m, k - k1);
         let mut inputs = Vec::with_capacity(count);
         for (l, point) in problem.points().iter().enumerate() {
             let (lower, basis) = linalg::lq(&stack(&point.h, &point.w));
@@ -50,7 +51,7 @@ impl Reduced {
         let g = gram(&w_rest);
         let omega: Vec<f64> = problem.points().iter().map(|p| p.omega).collect();
         let layout = Layout::new(mix.nrows(), problem.lags());
-        let phases = Phases::new(&omega, problem.max_lags());
+        let phases = LagPhasors::new(&omega, problem.max_lags());
         Ok(Self { h, w, w_rest, g, inputs, mix, layout, phases })
     }
 
@@ -59,27 +60,27 @@ impl Reduced {
     }
 
     /// `k_l = w_l - F(omega_l) h_l` for the unknowns `x`.
-    pub(super) fn error(&self, x: &[f64]) -> Blocks {
+    pub(super) fn error(&self, x: &[f64]) -> Batch {
         let mut k = self.w.clone();
         k.add_scaled(-1.0, &self.image(x));
         k
     }
 
     /// `F(omega_l) h_l` for the unknowns `x`.
-    pub(super) fn image(&self, x: &[f64]) -> Blocks {
-        let mut f = Blocks::zeros(self.count(), self.layout.rows, self.layout.channels);
+    pub(super) fn image(&self, x: &[f64]) -> Batch {
+        let mut f = Batch::zeros(self.count(), self.layout.rows, self.layout.channels);
         self.phases.response(&self.layout.scatter(x), &mut f);
-        let mut image = Blocks::zeros(self.count(), self.layout.rows, self.h.cols());
+        let mut image = Batch::zeros(self.count(), self.layout.rows, self.h.cols());
         for l in 0..self.count() {
             image.block_mut(l).set_product(1.0, f.block(l).plain(), self.h.block(l).plain());
         }
         image
     }
 
-    /// `2 Re sum_l e^{i omega_l j} (y_l h_l*)_{p,i}` for all unknowns: the adjoint of [`Reduced::image`]
-    /// for the inner product `2 Re sum tr(y* k)`.
-    pub(super) fn adjoint(&self, y: &Blocks) -> Vec<f64> {
-        let mut e = Blocks::zeros(self.count(), self.layout.rows, self.layout.channels);
+    /// `2 Re sum_l e^{i omega_l j} (y_l h_l*)_{p,i}` for all unknowns: the adjoint of
+    /// [`Reduced::image`] for the inner product `2 Re sum tr(y* k)`.
+    pub(super) fn adjoint(&self, y: &Batch) -> Vec<f64> {
+        let mut e = Batch::zeros(self.count(), self.layout.rows, self.layout.channels);
         for l in 0..self.count() {
             e.block_mut(l).set_product(2.0, y.block(l).plain(), self.h.block(l).adjoint());
         }
@@ -87,7 +88,7 @@ impl Reduced {
     }
 
     /// The taps in the original channels.
-    pub(super) fn taps(&self, x: &[f64]) -> Taps {
+    pub(super) fn taps(&self, x: &[f64]) -> FirMatrix {
         let (m, n) = (self.layout.rows, self.layout.channels);
         let c = self.layout.scatter(x);
         c.column_iter().map(|col| Mat::from_column_slice(m, n, col.as_slice()) * &self.mix).collect()
@@ -114,7 +115,7 @@ fn stack(h: &CMat, w: &CMat) -> CMat {
 
 /// n x N real matrix after which the channels, summed over all points, have unit mean power each and
 /// no correlation. Equal channels become one, zero channels none.
-fn mixing(channels: &Blocks) -> Result<Mat, LinalgError> {
+fn mixing(channels: &Batch) -> Result<Mat, LinalgError> {
     let (n, k, count) = (channels.rows(), channels.cols(), channels.count());
     let half = k * count;
     let mut all = Mat::from_fn(n, 2 * half, |i, c| {
@@ -130,17 +131,17 @@ fn mixing(channels: &Blocks) -> Result<Mat, LinalgError> {
     Ok(Mat::from_fn(rank, n, |r, i| power / svd.s[r] * svd.u[(i, r)] * unit[i]))
 }
 
-fn mixed(channels: &Blocks, mix: &Mat) -> Blocks {
+fn mixed(channels: &Batch, mix: &Mat) -> Batch {
     let mix = linalg::to_complex(mix);
-    let mut h = Blocks::zeros(channels.count(), mix.nrows(), channels.cols());
+    let mut h = Batch::zeros(channels.count(), mix.nrows(), channels.cols());
     for l in 0..channels.count() {
         h.set(l, &(&mix * channels.to_matrix(l)));
     }
     h
 }
 
-fn gram(a: &Blocks) -> Blocks {
-    let mut g = Blocks::zeros(a.count(), a.rows(), a.rows());
+fn gram(a: &Batch) -> Batch {
+    let mut g = Batch::zeros(a.count(), a.rows(), a.rows());
     for l in 0..a.count() {
         g.block_mut(l).set_product(1.0, a.block(l).plain(), a.block(l).adjoint());
     }

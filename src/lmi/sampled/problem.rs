@@ -1,14 +1,11 @@
 //! The data of a sampled problem.
 
-use crate::linalg::{self, CMat, Complex, LinalgError, Mat};
-
-/// Real taps: `F_j` is M x N, one matrix for each lag j. Entries beyond a row's own number of lags
-/// are zero.
-pub type Taps = Vec<Mat>;
+use crate::linalg::{self, CMat, LinalgError, Mat};
+use crate::lti::FirMatrix;
 
 /// A frequency with the responses of the reference and the measurements.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct FrequencyPoint {
     /// Frequency in radians per lag.
     pub omega: f64,
     /// Response of the reference, M x q.
@@ -17,7 +14,7 @@ pub struct Point {
     pub h: CMat,
 }
 
-impl Point {
+impl FrequencyPoint {
     /// K = W - F H for the filters' response F.
     pub(crate) fn error(&self, filters: &CMat) -> CMat {
         &self.w - filters * &self.h
@@ -47,17 +44,17 @@ impl MeanSquareObjective {
 
 /// A sampled worst-case norm problem with consistent sizes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Problem {
-    points: Vec<Point>,
+pub struct SampledProblem {
+    points: Vec<FrequencyPoint>,
     lags: Vec<usize>,
 }
 
-impl Problem {
+impl SampledProblem {
     /// `lags[p]` is the number of lags of row p, M of them; 0 fixes the row at zero.
     ///
     /// # Panics
     /// Unless there is a point, all points have the sizes of the first, and each row has its lags.
-    pub fn new(points: Vec<Point>, lags: Vec<usize>) -> Self {
+    pub fn new(points: Vec<FrequencyPoint>, lags: Vec<usize>) -> Self {
         let (w, h) = (points[0].w.shape(), points[0].h.shape());
         let fits = points.iter().all(|point| point.w.shape() == w && point.h.shape() == h);
         assert!(
@@ -68,7 +65,7 @@ impl Problem {
     }
 
     /// The points.
-    pub(crate) fn points(&self) -> &[Point] {
+    pub(crate) fn points(&self) -> &[FrequencyPoint] {
         &self.points
     }
 
@@ -98,43 +95,33 @@ impl Problem {
     }
 
     /// Taps that are all zero.
-    pub(crate) fn zero_taps(&self) -> Taps {
-        vec![Mat::zeros(self.rows(), self.channels()); self.max_lags()]
+    pub(crate) fn zero_taps(&self) -> FirMatrix {
+        FirMatrix::new(vec![Mat::zeros(self.rows(), self.channels()); self.max_lags().max(1)])
     }
 
     /// The same problem with more points.
-    pub(crate) fn with_points(&self, more: impl IntoIterator<Item = Point>) -> Self {
+    pub(crate) fn with_points(&self, more: impl IntoIterator<Item = FrequencyPoint>) -> Self {
         Self::new(self.points.iter().cloned().chain(more).collect(), self.lags.clone())
     }
 
     /// `K_l = W_l - sum_j e^{-i omega_l j} F_j H_l`.
-    pub(crate) fn error_at(&self, l: usize, taps: &Taps) -> CMat {
+    pub(crate) fn error_at(&self, l: usize, taps: &FirMatrix) -> CMat {
         let point = &self.points[l];
-        point.error(&response(taps, point.omega, self.rows(), self.channels()))
+        point.error(&taps.response(point.omega))
     }
 
     /// Largest `sigma_max(K_l)` over the points.
-    pub(crate) fn worst(&self, taps: &Taps) -> Result<f64, LinalgError> {
+    pub(crate) fn worst(&self, taps: &FirMatrix) -> Result<f64, LinalgError> {
         let gain = |l: usize| linalg::largest_singular_value(&self.error_at(l, taps));
         (0..self.points.len()).map(gain).try_fold(0.0, |worst, gain| Ok(f64::max(worst, gain?)))
     }
 
     /// Value of the secondary objective: see [`MeanSquareObjective`].
-    pub(crate) fn mean_square(&self, taps: &Taps, square: &MeanSquareObjective) -> f64 {
+    pub(crate) fn mean_square(&self, taps: &FirMatrix, square: &MeanSquareObjective) -> f64 {
         let error = |l: usize| self.error_at(l, taps).iter().map(|z| z.norm_sqr()).sum::<f64>();
         let errors: f64 = square.weights.iter().enumerate().map(|(l, w)| w * error(l)).sum();
         let noise =
             |f: &Mat| f.column_iter().zip(&square.noise).map(|(c, n)| n * c.norm_squared()).sum::<f64>();
-        errors + taps.iter().map(noise).sum::<f64>()
+        errors + taps.lags().iter().map(noise).sum::<f64>()
     }
-}
-
-/// `F(omega) = sum_j e^{-i omega j} F_j`.
-pub(crate) fn response(taps: &[Mat], omega: f64, m: usize, n: usize) -> CMat {
-    let mut f = CMat::zeros(m, n);
-    for (j, fj) in taps.iter().enumerate() {
-        let phase = Complex::from_polar(1.0, -omega * j as f64);
-        f.zip_apply(fj, |z, x| *z += phase * x);
-    }
-    f
 }

@@ -6,9 +6,10 @@
 
 use super::newton;
 use super::prepare::Reduced;
-use super::problem::{MeanSquareObjective, Taps};
+use super::problem::MeanSquareObjective;
 use crate::linalg::Mat;
-use crate::linalg::blocks::Blocks;
+use crate::linalg::blocks::Batch;
+use crate::lti::FirMatrix;
 
 /// See the module's text.
 #[derive(Debug, Clone)]
@@ -27,7 +28,7 @@ impl Quadratic {
     pub(super) fn new(
         reduced: &Reduced,
         square: &MeanSquareObjective,
-        start: &Taps,
+        start: &FirMatrix,
         cap: f64,
         unit: f64,
     ) -> Self {
@@ -36,9 +37,9 @@ impl Quadratic {
         noisy.column_iter_mut().zip(&square.noise).for_each(|(mut column, noise)| column *= *noise);
         let gram = &noisy * reduced.mix.transpose() / unit;
         let (m, n) = (reduced.layout.rows, reduced.layout.channels);
-        let mut slope = Mat::zeros(m * n, start.len());
+        let mut slope = Mat::zeros(m * n, start.lags().len());
         let mut constant = 0.0;
-        for (j, f) in start.iter().enumerate() {
+        for (j, f) in start.lags().iter().enumerate() {
             let cross = f * noisy.transpose() * (2.0 / (unit * cap));
             slope.column_mut(j).copy_from_slice(cross.as_slice());
             let power = f.column_iter().zip(&square.noise).map(|(c, noise)| noise * c.norm_squared());
@@ -48,7 +49,7 @@ impl Quadratic {
     }
 
     /// The objective at the unknowns `x`, whose errors are `k`.
-    pub(super) fn value(&self, k: &Blocks, x: &[f64]) -> f64 {
+    pub(super) fn value(&self, k: &Batch, x: &[f64]) -> f64 {
         let square = |l: usize| k.block(l).data.iter().map(|z| z.norm_sqr()).sum::<f64>();
         let errors: f64 = self.weights.iter().enumerate().map(|(l, w)| w * square(l)).sum();
         let (bent, straight) = self.noise_slope(x);
@@ -57,7 +58,7 @@ impl Quadratic {
     }
 
     /// Its derivative in the unknowns.
-    pub(super) fn gradient(&self, reduced: &Reduced, k: &Blocks, x: &[f64]) -> Vec<f64> {
+    pub(super) fn gradient(&self, reduced: &Reduced, k: &Batch, x: &[f64]) -> Vec<f64> {
         let mut weighted = k.clone();
         let size = weighted.rows() * weighted.cols();
         for (i, z) in weighted.as_mut_slice().iter_mut().enumerate() {

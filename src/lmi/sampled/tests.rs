@@ -11,9 +11,10 @@ use crate::lmi::FINEST_GAP;
 use crate::lmi::testbank::{self, TestBank};
 use crate::random::Random;
 
-fn bank_problem(bank: &TestBank, omegas: &[f64], taps: usize) -> Problem {
-    let points = bank.samples(omegas).into_iter().map(|(omega, w, h)| Point { omega, w, h }).collect();
-    Problem::new(points, bank.lags(taps))
+fn bank_problem(bank: &TestBank, omegas: &[f64], taps: usize) -> SampledProblem {
+    let points =
+        bank.samples(omegas).into_iter().map(|(omega, w, h)| FrequencyPoint { omega, w, h }).collect();
+    SampledProblem::new(points, bank.lags(taps))
 }
 
 /// `(gamma - lower) / gamma`, 0 when gamma is 0.
@@ -22,12 +23,12 @@ fn relative_gap(s: &Solution) -> f64 {
 }
 
 /// What every result promises, whatever the problem.
-fn check(problem: &Problem, s: &Solution) {
+fn check(problem: &SampledProblem, s: &Solution) {
     assert_eq!(problem.worst(&s.taps).unwrap(), s.gamma);
     assert!(s.lower.value <= s.gamma);
 }
 
-fn report(name: &str, problem: &Problem, s: &Solution, seconds: f64) {
+fn report(name: &str, problem: &SampledProblem, s: &Solution, seconds: f64) {
     println!(
         "{name}: solved {} gamma {:.10} lower {:.10} gap {:.1e} steps {} {:?} {} unknowns {} points {:.3} s",
         s.is_solved,
@@ -42,7 +43,7 @@ fn report(name: &str, problem: &Problem, s: &Solution, seconds: f64) {
     );
 }
 
-fn solve(name: &str, problem: &Problem) -> Solution {
+fn solve(name: &str, problem: &SampledProblem) -> Solution {
     let start = std::time::Instant::now();
     let s = minimise(problem, FINEST_GAP, &|| false).unwrap();
     report(name, problem, &s, start.elapsed().as_secs_f64());
@@ -58,32 +59,37 @@ fn wavy(rows: usize, cols: usize, seed: f64) -> CMat {
     })
 }
 
-fn wavy_problem((m, n, q): (usize, usize, usize), omegas: &[f64], lags: &[usize]) -> Problem {
+fn wavy_problem((m, n, q): (usize, usize, usize), omegas: &[f64], lags: &[usize]) -> SampledProblem {
     let point = |(l, omega): (usize, &f64)| {
         let l = l as f64;
-        Point { omega: *omega, w: wavy(m, q, 0.3 + 0.77 * l), h: wavy(n, q, 1.9 + 1.23 * l) }
+        FrequencyPoint { omega: *omega, w: wavy(m, q, 0.3 + 0.77 * l), h: wavy(n, q, 1.9 + 1.23 * l) }
     };
-    Problem::new(omegas.iter().enumerate().map(point).collect(), lags.to_vec())
+    SampledProblem::new(omegas.iter().enumerate().map(point).collect(), lags.to_vec())
 }
 
 fn random_matrix(random: &mut Random, rows: usize, cols: usize) -> CMat {
     CMat::from_fn(rows, cols, |_, _| Complex::new(random.sample(), random.sample()))
 }
 
-fn random_problem(seed: u64, (m, n, q): (usize, usize, usize), points: usize, lags: &[usize]) -> Problem {
+fn random_problem(
+    seed: u64,
+    (m, n, q): (usize, usize, usize),
+    points: usize,
+    lags: &[usize],
+) -> SampledProblem {
     let mut r = Random(seed);
-    let mut point = || Point {
+    let mut point = || FrequencyPoint {
         omega: std::f64::consts::FRAC_PI_2 * (1.0 + r.sample()),
         w: random_matrix(&mut r, m, q),
         h: random_matrix(&mut r, n, q),
     };
-    Problem::new((0..points).map(|_| point()).collect(), lags.to_vec())
+    SampledProblem::new((0..points).map(|_| point()).collect(), lags.to_vec())
 }
 
-fn changed(problem: &Problem, change: impl Fn(usize, &mut Point)) -> Problem {
+fn changed(problem: &SampledProblem, change: impl Fn(usize, &mut FrequencyPoint)) -> SampledProblem {
     let mut points = problem.points().to_vec();
     points.iter_mut().enumerate().for_each(|(l, p)| change(l, p));
-    Problem::new(points, problem.lags().to_vec())
+    SampledProblem::new(points, problem.lags().to_vec())
 }
 
 /// (M, N, q), points, lags.

@@ -2,12 +2,13 @@
 
 use super::basis::Basis;
 use super::bound::{self, LowerBound};
-use super::interior::{Engine, Objective, norm};
+use super::interior::{InteriorIterate, Objective, norm};
 use super::prepare::Reduced;
-use super::problem::{Problem, Taps};
+use super::problem::SampledProblem;
 use crate::linalg::LinalgError;
 use crate::lmi::IsDue;
 use crate::lmi::iteration::{self, GAP_OF_ZERO, Iterate, RANK_TOLERANCE};
+use crate::lti::FirMatrix;
 
 /// The start lies this factor above the worst point of the least-squares taps (in t), far enough inside for
 /// the first Newton step.
@@ -19,7 +20,7 @@ pub struct Solution {
     /// Whether the gap to the lower bound is within the tolerance.
     pub is_solved: bool,
     /// `F_j`, M x N for each lag.
-    pub taps: Taps,
+    pub taps: FirMatrix,
     /// Largest `sigma_max(K_l)` of these taps over the points.
     pub gamma: f64,
     /// Lower bound on gamma for all taps of the same lags, rounding errors subtracted.
@@ -36,14 +37,18 @@ pub struct Solution {
 ///
 /// # Errors
 /// [`LinalgError`] if the data are not finite or a decomposition does not converge.
-pub fn minimise(problem: &Problem, tol_gap_rel: f64, is_due: IsDue<'_>) -> Result<Solution, LinalgError> {
+pub fn minimise(
+    problem: &SampledProblem,
+    tol_gap_rel: f64,
+    is_due: IsDue<'_>,
+) -> Result<Solution, LinalgError> {
     let mut reduced = Reduced::new(problem)?;
     if reduced.layout.unknowns() == 0 {
         return fixed(problem);
     }
     let basis = Basis::new(&reduced, vec![1.0; reduced.count()], &[])?;
     let x = basis.least_squares(&reduced, &reduced.w, RANK_TOLERANCE);
-    let best = Best::new(problem, reduced.taps(&x))?;
+    let best = LeastGamma::new(problem, reduced.taps(&x))?;
     if best.relative_gap() <= tol_gap_rel {
         return Ok(best.finish(true, 0));
     }
@@ -52,10 +57,12 @@ pub fn minimise(problem: &Problem, tol_gap_rel: f64, is_due: IsDue<'_>) -> Resul
     reduced.w = reduced.error(&x);
     reduced.rescale(scale);
     let zero = vec![0.0; x.len()];
-    let Some(engine) = Engine::new(&reduced, Objective::WorstCase, zero, START_MARGIN, is_due) else {
+    let Some(engine) = InteriorIterate::new(&reduced, Objective::WorstCase, zero, START_MARGIN, is_due)
+    else {
         return Ok(best.finish(false, 0));
     };
-    let mut run = Run { problem, reduced: &reduced, basis: &basis, start: x, scale, engine, best };
+    let mut run =
+        WorstCaseIteration { problem, reduced: &reduced, basis: &basis, start: x, scale, engine, best };
     let (is_solved, iterations) = iteration::run(&mut run, tol_gap_rel, is_due)?;
     if is_due() {
         run.offer_taps()?;
@@ -64,23 +71,23 @@ pub fn minimise(problem: &Problem, tol_gap_rel: f64, is_due: IsDue<'_>) -> Resul
 }
 
 /// A problem without taps: its worst case is the optimum.
-fn fixed(problem: &Problem) -> Result<Solution, LinalgError> {
+fn fixed(problem: &SampledProblem) -> Result<Solution, LinalgError> {
     let taps = problem.zero_taps();
     let gamma = problem.worst(&taps)?;
     let lower = LowerBound { value: gamma, covers_all: true };
     Ok(Solution { is_solved: true, taps, gamma, lower, iterations: 0 })
 }
 
-struct Best {
+struct LeastGamma {
     /// Gap that counts as zero.
     floor: f64,
-    taps: Taps,
+    taps: FirMatrix,
     gamma: f64,
     lower: LowerBound,
 }
 
-impl Best {
-    fn new(problem: &Problem, taps: Taps) -> Result<Self, LinalgError> {
+impl LeastGamma {
+    fn new(problem: &SampledProblem, taps: FirMatrix) -> Result<Self, LinalgError> {
         let gamma = problem.worst(&taps)?;
         let floor = GAP_OF_ZERO * problem.worst(&problem.zero_taps())?;
         Ok(Self { floor, taps, gamma, lower: LowerBound { value: 0.0, covers_all: true } })
@@ -98,17 +105,17 @@ impl Best {
 }
 
 /// The iteration, and what it has found.
-struct Run<'a> {
-    problem: &'a Problem,
+struct WorstCaseIteration<'a> {
+    problem: &'a SampledProblem,
     reduced: &'a Reduced,
     basis: &'a Basis,
     start: Vec<f64>,
     scale: f64,
-    engine: Engine<'a>,
-    best: Best,
+    engine: InteriorIterate<'a>,
+    best: LeastGamma,
 }
 
-impl Run<'_> {
+impl WorstCaseIteration<'_> {
     /// Takes the taps of the iterate if they are better.
     fn offer_taps(&mut self) -> Result<(), LinalgError> {
         let x: Vec<f64> = self.start.iter().zip(&self.engine.x).map(|(a, b)| a + self.scale * b).collect();
@@ -121,7 +128,7 @@ impl Run<'_> {
     }
 }
 
-impl Iterate for Run<'_> {
+impl Iterate for WorstCaseIteration<'_> {
     /// A quarter of the complementarity gap and of the residual: from there on, the gap of the bound that
     /// the dual matrices give is usually within the tolerance.
     fn gap(&mut self) -> f64 {

@@ -3,6 +3,7 @@
 
 use super::*;
 use crate::linalg::{CMat, Complex};
+use crate::lti::FirMatrix;
 use nalgebra::DVector;
 
 /// Points on the unit circle and off it.
@@ -127,7 +128,7 @@ fn fir_filters_are_their_polynomial() {
     for (p, m, lags) in [(2, 3, 1), (2, 3, 5), (1, 1, 2), (4, 1, 3), (1, 4, 3)] {
         let tap = |j: usize| Mat::from_fn(p, m, |r, c| ((r + 3 * c + 7 * j) as f64).sin());
         let taps: Vec<Mat> = (0..lags).map(tap).collect();
-        let made = StateSpace::fir(&taps);
+        let made = FirMatrix::new(taps.clone()).state_space();
         assert_eq!(made.order(), m * (lags - 1));
         let term = |z: Complex<f64>, j: usize| linalg::to_complex(&taps[j]) * z.powi(-(j as i32));
         check(&made, |z| (0..lags).map(|j| term(z, j)).sum(), 1.0);

@@ -113,7 +113,7 @@ fn refinement_reaches_the_peak_whatever_the_first_points() {
             let rounding = 3e-12 * ((w * 1e15).rem_euclid(7.0) / 3.5 - 1.0);
             CMat::from_element(1, 1, Complex::new(gain((w - middle) / width) + rounding, 0.0))
         };
-        let search = Search::new(&empty, 0, &response, Vec::new());
+        let search = PeakSearch::new(&empty, 0, &response, Vec::new());
         let look = |x: f64| search.at(middle + x * width).unwrap();
         let top = refine(|w| search.at(w), [look(-1.0), look(0.0), look(1.0)], FLAT_GAIN).unwrap();
         let exact = gain(slope / (1.0 + (1.0 + 3.0 * skew * slope).sqrt()));

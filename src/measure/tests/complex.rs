@@ -183,7 +183,7 @@ fn bins_of_complex_spectra_have_their_sign() {
         for k in [-7, -1, 1, 3, 7] {
             let cycles = f64::from(k) / count as f64;
             let [real, imaginary] = IDEAL.record(count, exponential(0.3, cycles));
-            let spectrum = Spectrum::complex(&real, &imaginary, RATE, Window::None);
+            let spectrum = RecordSpectrum::complex(&real, &imaginary, RATE, Window::None);
             assert_eq!(spectrum.amplitudes.len(), count);
             let largest =
                 (0..count).max_by(|&a, &b| spectrum.amplitudes[a].total_cmp(&spectrum.amplitudes[b]));

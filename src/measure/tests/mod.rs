@@ -261,12 +261,12 @@ fn windows_have_their_known_bandwidths_and_side_lobes() {
     ] {
         close(window.noise_bandwidth(), bandwidth, 0.01);
         let samples = tone(4096, 500.0 / 4096.0, 0.7);
-        let spectrum = Spectrum::new(&samples, RATE, window);
+        let spectrum = RecordSpectrum::new(&samples, RATE, window);
         close(spectrum.amplitudes[500], 0.7, 1e-12);
         close(spectrum.frequency(500).0, 500.0 * RATE.0 / 4096.0, 1e-6);
         close(spectrum.mean_square(0, 2049), 0.245, 1e-9);
         // Half a bin off, beyond the main lobe.
-        let leaking = Spectrum::new(&tone(4096, 500.5 / 4096.0, 0.7), RATE, window);
+        let leaking = RecordSpectrum::new(&tone(4096, 500.5 / 4096.0, 0.7), RATE, window);
         let beyond = window.coefficients().len() + 1;
         let lobes = leaking.amplitudes[500 + beyond..700].iter().fold(0.0, |most: f64, a| most.max(*a));
         let level = 20.0 * (lobes / 0.7).log10();

@@ -3,14 +3,14 @@
 use crate::linalg::Complex;
 use crate::random::Random;
 use crate::sine_fit::result::wrapped;
-use crate::sine_fit::{Channel, ComplexChannel, Component, Direction, SineFit, ToneFit, fit, fit_known};
+use crate::sine_fit::{Channel, ComplexChannel, Component, Sense, SineFit, ToneFit, fit, fit_known};
 use crate::units::Hertz;
 use std::f64::consts::TAU;
 
 const RATE: Hertz = Hertz(1e6);
 const PARTS: ComplexChannel = [0, 1];
 
-fn exponential(fit: &SineFit, direction: Direction) -> ToneFit {
+fn exponential(fit: &SineFit, direction: Sense) -> ToneFit {
     fit.phasor(Component::Complex(PARTS, direction), 0)
 }
 
@@ -39,7 +39,7 @@ fn both_exponentials_are_those_that_are_there() {
             let channels = [Channel::new(&parts[0]), Channel::new(&parts[1])];
             let found = fit(&channels, RATE, &[RATE * (cycles + 0.1 / count as f64)]).unwrap();
             assert!((found.frequencies[0].value / RATE - cycles).abs() < 1e-13, "{cycles} {count}");
-            for (direction, z) in [(Direction::Forward, a), (Direction::Backward, b)] {
+            for (direction, z) in [(Sense::Forward, a), (Sense::Backward, b)] {
                 let ToneFit { amplitude, phase } = exponential(&found, direction);
                 assert!((amplitude.value - z.norm()).abs() < 1e-12, "{cycles} {count} {direction:?}");
                 assert!(angle(phase.value.0, z.arg()) < 1e-9, "{cycles} {count} {direction:?}");
@@ -65,13 +65,13 @@ fn standard_deviations_are_the_cramer_rao_bounds_of_an_exponential() {
         // The image has a hundredth of the power and tells of the frequency too.
         (6.0 / (snr * 1.01 * n * (n * n - 1.0))).sqrt(),
     );
-    let tone = exponential(&found, Direction::Forward);
+    let tone = exponential(&found, Sense::Forward);
     close(tone.amplitude.sigma / size, 1.0 / (2.0 * n * snr).sqrt());
     // At the beginning of the record the error of the frequency adds three times the variance.
     close(tone.phase.sigma.0, (4.0 / (2.0 * n * snr)).sqrt());
-    let known = exponential(&fit_known(&channels, RATE, &[RATE * cycles]).unwrap(), Direction::Forward);
+    let known = exponential(&fit_known(&channels, RATE, &[RATE * cycles]).unwrap(), Sense::Forward);
     close(known.phase.sigma.0, 1.0 / (2.0 * n * snr).sqrt());
-    let image = exponential(&found, Direction::Backward);
+    let image = exponential(&found, Sense::Backward);
     close(image.amplitude.sigma, tone.amplitude.sigma);
 }
 
@@ -84,7 +84,7 @@ fn standard_deviations_are_the_scatter_of_repeated_records() {
         let parts = record(count, cycles, [0.0.into(), a, 0.0.into()], sigma, 100 + seed);
         let channels = [Channel::new(&parts[0]), Channel::new(&parts[1])];
         let found = fit(&channels, RATE, &[RATE * cycles]).unwrap();
-        let ToneFit { amplitude, phase } = exponential(&found, Direction::Forward);
+        let ToneFit { amplitude, phase } = exponential(&found, Sense::Forward);
         let frequency = found.frequencies[0];
         let quadrature = found.ratio(Component::Real(1), Component::Real(0), 0).phase;
         let errors = [

@@ -107,7 +107,7 @@ impl RowFilter {
 }
 
 /// What is known of the samples of one filter and box.
-struct Known {
+struct FilterBox {
     filter: usize,
     half_widths: HalfWidths,
     bound: f64,
@@ -136,7 +136,7 @@ impl Remainders<'_> {
         owners: &[usize],
         errors: &ErrorBox,
     ) -> Result<Vec<f64>, VerifyError> {
-        let mut known: Vec<Known> = Vec::new();
+        let mut known: Vec<FilterBox> = Vec::new();
         let bound = |(instant, &converter): (&SamplingInstant, &usize)| {
             let half_widths = HalfWidths::of(errors, converter);
             let first_order = self.known_of_slopes(instant.filter, half_widths, &mut known);
@@ -148,11 +148,11 @@ impl Remainders<'_> {
     }
 
     /// The bound of [`Self::of_slopes`], computed once.
-    fn known_of_slopes(&self, filter: usize, half_widths: HalfWidths, known: &mut Vec<Known>) -> f64 {
+    fn known_of_slopes(&self, filter: usize, half_widths: HalfWidths, known: &mut Vec<FilterBox>) -> f64 {
         let found = known.iter().find(|known| known.filter == filter && known.half_widths == half_widths);
         found.map(|known| known.bound).unwrap_or_else(|| {
             let bound = self.of_slopes(filter, half_widths);
-            known.push(Known { filter, half_widths, bound });
+            known.push(FilterBox { filter, half_widths, bound });
             bound
         })
     }

@@ -15,9 +15,10 @@
 
 use super::super::ball::{self, Ball, Matrix};
 use super::super::front_ends::{Equations, FrontEnds};
-use super::super::state_transition::{StateTransition, state_transition};
+use super::super::positive::SUM_OUTWARD;
+use super::super::state_transition::{EnclosedTransition, state_transition};
 use super::super::timeline::SamplingInstant;
-use crate::arithmetic::{DoubleDouble, Float512, Number};
+use crate::arithmetic::{DoubleDouble, Float, Float512, LongBall};
 use crate::units::{FastPeriods, GridTime, Seconds};
 
 /// C of the module's page. `the_pade_form_leaves_at_most_its_remainder` proves it.
@@ -37,8 +38,6 @@ const STEADY_DOUBLINGS: usize = 64;
 const REMAINDER_OUTWARD: f64 = 1.01;
 /// Radii and the rest of a sum over it up to which it is resolved.
 const RESOLVED: f64 = 1e-2;
-/// Makes up for the roundings of a sum of bounds in double precision.
-const SUM_OUTWARD: f64 = 1.001;
 
 /// The delta of the Pade form for an error of the delay.
 pub(super) fn pade_width(half: FastPeriods) -> FastPeriods {
@@ -59,13 +58,13 @@ pub(super) fn delay_curvature(filter: &Equations, delta: FastPeriods) -> Equatio
 }
 
 /// c / (1 + s delta / 2) + d.
-fn smoother(delta: FastPeriods, [c, d]: [Ball<Float512>; 2]) -> Equations {
+fn smoother(delta: FastPeriods, [c, d]: [LongBall; 2]) -> Equations {
     let scalar = |x| Matrix::from_element(1, 1, x);
     let rate = rate(delta);
     Equations { a: scalar(-rate), b: scalar(rate), c: scalar(c), d }
 }
 
-fn rate(delta: FastPeriods) -> Ball<Float512> {
+fn rate(delta: FastPeriods) -> LongBall {
     Ball::from(2.0) / Ball::from(delta.0)
 }
 
@@ -104,9 +103,9 @@ pub(super) fn row_norm(signal: Option<&Equations>, filter: Equations, ratio: usi
 }
 
 /// A bound on the sum of |r(n M)|; `None` if the precision of F does not suffice.
-fn square_of_row<F: Number>(front_ends: &FrontEnds, sample: &SamplingInstant, ratio: usize) -> Option<f64> {
+fn square_of_row<F: Float>(front_ends: &FrontEnds, sample: &SamplingInstant, ratio: usize) -> Option<f64> {
     let (a, b) = front_ends.dynamics::<F>();
-    let StateTransition { transition, gramian } = state_transition(&a, &b, Ball::from(ratio as f64));
+    let EnclosedTransition { transition, gramian } = state_transition(&a, &b, Ball::from(ratio as f64));
     let row = front_ends.output(sample);
     let state = steady_state(&transition, &gramian)?;
     absolute_sum(&row, &transition, &ball::product_transposed(&state, &row))
@@ -114,7 +113,7 @@ fn square_of_row<F: Number>(front_ends: &FrontEnds, sample: &SamplingInstant, ra
 
 /// X = E X E' + G by doubling; the remainder after 2^k steps is at most ||E^(2^k)||^2 of the whole.
 /// `None` if E is not seen to be stable.
-fn steady_state<F: Number>(transition: &Matrix<F>, gramian: &Matrix<F>) -> Option<Matrix<F>> {
+fn steady_state<F: Float>(transition: &Matrix<F>, gramian: &Matrix<F>) -> Option<Matrix<F>> {
     let (mut state, mut power) = (gramian.clone(), transition.clone());
     for _ in 0..STEADY_DOUBLINGS {
         let size = ball::row_sum(&power) * ball::row_sum(&power.transpose());
@@ -133,7 +132,7 @@ fn steady_state<F: Number>(transition: &Matrix<F>, gramian: &Matrix<F>) -> Optio
 /// The rows c E^n go on from their midpoints, since the radii of many products would grow without end. What
 /// that leaves out of a row reaches the later ones through powers of E, whose row sums are bounded by those
 /// of E, E^2, E^4, ..
-fn absolute_sum<F: Number>(row: &Matrix<F>, transition: &Matrix<F>, x: &Matrix<F>) -> Option<f64> {
+fn absolute_sum<F: Float>(row: &Matrix<F>, transition: &Matrix<F>, x: &Matrix<F>) -> Option<f64> {
     let (mut power, mut periods, mut growth) = (transition.clone(), 1, 1.0f64);
     // Unknown numbers are not small.
     let is_small = |power: &Matrix<F>| ball::row_sum(power) < SMALL_POWER;

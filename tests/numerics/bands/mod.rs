@@ -6,7 +6,7 @@
 //! white noise in the band.
 
 use hybank::bank::Bank;
-use hybank::design::{Options, design};
+use hybank::design::{DesignOptions, design};
 use hybank::figures::Figures;
 use hybank::spec::{DesignOverrides, Spec};
 use serde_json::Value;
@@ -39,7 +39,7 @@ fn systems() -> Vec<System> {
 
 /// Image and SNR, decibels.
 fn reached(spec: &Spec) -> [f64; 2] {
-    figures(&design(spec, &Options::without_proof()).unwrap().bank)
+    figures(&design(spec, &DesignOptions::without_proof()).unwrap().bank)
 }
 
 fn figures(bank: &Bank) -> [f64; 2] {
@@ -64,7 +64,7 @@ fn banks_for_a_band_reach_the_figures_of_the_table() {
 fn banks_for_any_input_do_not_know_the_band() {
     for System { spec, without, with_band } in systems() {
         let mut bank =
-            design(&Spec { signal: None, ..spec.clone() }, &Options::without_proof()).unwrap().bank;
+            design(&Spec { signal: None, ..spec.clone() }, &DesignOptions::without_proof()).unwrap().bank;
         bank.spec = Some(spec);
         let found = figures(&bank);
         println!(

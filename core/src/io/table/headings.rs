@@ -1,7 +1,7 @@
 //! What the lines before the numbers say: which column is the time, in which unit, and the rate.
 
 use super::stamp::Stamp;
-use crate::quantity::{self, Time};
+use crate::quantity::{self, WrittenTime};
 
 /// What the heading of a column says of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -172,7 +172,7 @@ fn stated(text: &str, next: Option<&str>, is_rate: bool) -> Option<StatedRate> {
     let value = if is_rate {
         quantity::rate(&text).ok()?.0
     } else {
-        let Ok(Time::Seconds(time)) = quantity::time(&text) else { return None };
+        let Ok(WrittenTime::Seconds(time)) = quantity::time(&text) else { return None };
         time.0 * next.filter(|_| number == text).and_then(|next| unit_of(next.trim())).unwrap_or(1.0)
     };
     let stamp = Stamp::parse(number).filter(|_| value.is_finite() && value > 0.0)?;

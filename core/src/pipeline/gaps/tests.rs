@@ -1,5 +1,5 @@
 use super::*;
-use crate::bank::{StateSpace, SynthesisFilters};
+use crate::bank::{StateMatrices, SynthesisFilters};
 use crate::io::{PcmFormat, PcmFrames, SampleLayout};
 use crate::random::Random;
 use crate::runtime::{Algorithm, Frames, Interleaved, Options, Precision};
@@ -116,7 +116,7 @@ fn whatever_the_blocks_the_samples_and_marks_are_the_same() {
     let bytes: Vec<u8> = samples.iter().flat_map(|x| x.to_be_bytes()).collect();
     let layout = SampleLayout::packed(PcmFormat::F64Be);
     let fir = fir_bank(random_taps(2, 7, &mut random), 3);
-    let filter = StateSpace {
+    let filter = StateMatrices {
         a: vec![vec![0.5]],
         b: vec![vec![1.0, 1.0]],
         c: vec![vec![1.0]; 3],
@@ -219,7 +219,7 @@ fn the_mask_is_that_of_the_definition_for_filters_with_zeros_and_any_gaps() {
 #[test]
 fn a_response_of_a_recursion_ends_where_it_has_died_away() {
     let filter =
-        StateSpace { a: vec![vec![0.5]], b: vec![vec![1.0]], c: vec![vec![1.0]], d: vec![vec![0.0]] };
+        StateMatrices { a: vec![vec![0.5]], b: vec![vec![1.0]], c: vec![vec![1.0]], d: vec![vec![0.0]] };
     let bank = Bank {
         filters: SynthesisFilters::StateSpace(filter),
         ..Bank::bare(SynthesisFilters::Fir(vec![vec![0.0]]), 1)

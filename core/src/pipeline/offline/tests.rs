@@ -40,7 +40,7 @@ fn channels(frames: usize, gap: bool) -> [Vec<f32>; 2] {
 fn command(
     bank: &Bank,
     plan: &Plan,
-    parts: &[&dyn Input],
+    parts: &[&dyn FrameSource],
     settings: Settings<'_>,
     (format, is_complex): (PcmFormat, bool),
 ) -> (Written, Outcome) {
@@ -123,7 +123,7 @@ fn complex_samples_with_gaps_have_the_bits_and_gaps_of_the_command() {
     let recording = PcmFrames { layout: SampleLayout::packed(PcmFormat::F32Le), channels: 4, bytes: &bytes };
     let settings = Settings { gaps: Some(mean()), ..Settings::default() };
     let (real, imaginary) = (recording.part(0), recording.part(1));
-    let parts: [&dyn Input; 2] = [&real, &imaginary];
+    let parts: [&dyn FrameSource; 2] = [&real, &imaginary];
     let (want, outcome) = command(&bank, &plan, &parts, settings.clone(), (PcmFormat::F32Le, true));
     let mut bytes = vec![0; want.samples.len()];
     let mut output = PcmOutput::packed(PcmFormat::F32Le, &mut bytes);

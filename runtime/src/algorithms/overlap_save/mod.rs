@@ -18,12 +18,12 @@ mod shape;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use shape::Shape;
+pub(crate) use shape::TransformShape;
 
-use super::filter::{Facts, Filter, check_finite};
-use crate::adapters::{Input, Output};
+use super::filter::{AlgorithmFacts, Filter, check_finite};
+use crate::adapters::{FrameSink, FrameSource};
 use crate::simd::{Lanes, Product, Row, group_lanes, multiply, replace_not_finite};
-use crate::state::{Count, Numbers};
+use crate::state::{Count, StateNumbers};
 use crate::{BuildError, Isa, Sample};
 use rustfft::algorithm::Radix4;
 use rustfft::algorithm::butterflies::{Butterfly4, Butterfly8};
@@ -36,7 +36,7 @@ use std::sync::Arc;
 /// Coefficients in the order of use.
 #[derive(Debug)]
 pub(crate) struct OverlapSave<T: Sample> {
-    shape: Shape,
+    shape: TransformShape,
     forward: Transform<T::Portable>,
     inverse: Transform<T::Portable>,
     /// H(f) / F for 0 <= f <= F / 2: for each frequency and each group of phases a row for each channel.
@@ -62,7 +62,7 @@ pub(crate) struct OverlapSaveState<T: Sample> {
 
 impl<T: Sample> OverlapSave<T> {
     /// `taps[i]` = f_i at the fast rate, filters that fit `shape`.
-    pub(crate) fn new(taps: &[Vec<f64>], shape: Shape, isa: Isa) -> Result<Self, BuildError> {
+    pub(crate) fn new(taps: &[Vec<f64>], shape: TransformShape, isa: Isa) -> Result<Self, BuildError> {
         check_finite::<T>(taps)?;
         Ok(Self {
             shape,
@@ -81,7 +81,7 @@ impl<T: Sample> OverlapSave<T> {
             4 => self.filter::<4>(state),
             _ => self.filter::<8>(state),
         }
-        let Shape { channels, history, .. } = self.shape;
+        let TransformShape { channels, history, .. } = self.shape;
         let begin = self.shape.batch() * channels;
         state.samples.copy_within(begin..begin + history * channels, 0);
         state.filled = 0;
@@ -89,7 +89,7 @@ impl<T: Sample> OverlapSave<T> {
 
     fn filter<const D: usize>(&self, state: &mut OverlapSaveState<T>) {
         let OverlapSaveState { samples, output, channels, phases, rows, .. } = state;
-        let Shape { channels: n, ratio, history, len, .. } = self.shape;
+        let TransformShape { channels: n, ratio, history, len, .. } = self.shape;
         let block = self.shape.block();
         for (group, channels) in channels.chunks_exact_mut(len).enumerate() {
             gather::<T, D>(&samples[group * D..], [n, block * n], rows);
@@ -111,9 +111,9 @@ impl<T: Sample> OverlapSave<T> {
 impl<T: Sample> Filter for OverlapSave<T> {
     type State = OverlapSaveState<T>;
 
-    fn facts(&self) -> Facts {
+    fn facts(&self) -> AlgorithmFacts {
         let shape = &self.shape;
-        Facts {
+        AlgorithmFacts {
             name: "overlap-save",
             history: Some(shape.history),
             delay: shape.batch(),
@@ -143,8 +143,13 @@ impl<T: Sample> Filter for OverlapSave<T> {
         state.filled = 0;
     }
 
-    fn process(&self, state: &mut OverlapSaveState<T>, input: &dyn Input, output: &mut dyn Output) -> u64 {
-        let Shape { channels: n, ratio: m, history, .. } = self.shape;
+    fn process(
+        &self,
+        state: &mut OverlapSaveState<T>,
+        input: &dyn FrameSource,
+        output: &mut dyn FrameSink,
+    ) -> u64 {
+        let TransformShape { channels: n, ratio: m, history, .. } = self.shape;
         let (mut replaced, mut first) = (0, 0);
         while first < input.frames() {
             let frames = (input.frames() - first).min(self.shape.batch() - state.filled);
@@ -174,7 +179,7 @@ impl<T: Sample> Filter for OverlapSave<T> {
         inputs.iter().chain(waiting).for_each(|value| put(value.to_f64()));
     }
 
-    fn resume(&self, state: &mut OverlapSaveState<T>, filled: usize, numbers: Numbers<'_>) {
+    fn resume(&self, state: &mut OverlapSaveState<T>, filled: usize, numbers: StateNumbers<'_>) {
         Self::reset(state);
         state.filled = filled;
         let Count { inputs, sums } = self.count(filled);
@@ -213,8 +218,8 @@ fn scatter<T: Sample, const D: usize>(rows: &[Row<T>], samples: &mut [T], [frame
 }
 
 /// The spectra of all filters over F, made in f64, in the order of use.
-fn spectra<T: Sample>(taps: &[Vec<f64>], shape: &Shape) -> Vec<Row<T>> {
-    let Shape { channels, ratio, len, depth, segments, .. } = *shape;
+fn spectra<T: Sample>(taps: &[Vec<f64>], shape: &TransformShape) -> Vec<Row<T>> {
+    let TransformShape { channels, ratio, len, depth, segments, .. } = *shape;
     let forward = Transform::new(len, FftDirection::Forward);
     let mut spectra = vec![Row::<T>::zero(); (len / 2 + 1) * shape.outputs() * channels];
     let (mut filter, mut spectrum) = (vec![Complex::zero(); len], vec![Complex::zero(); len]);

@@ -12,7 +12,7 @@ const MOST_SPECTRA: usize = 1 << 24;
 
 /// How the stream is cut into transforms.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Shape {
+pub(crate) struct TransformShape {
     /// N.
     pub(super) channels: usize,
     /// M.
@@ -27,7 +27,7 @@ pub(crate) struct Shape {
     pub(super) segments: usize,
 }
 
-impl Shape {
+impl TransformShape {
     /// For N channels, M phases and K lags in groups of so many lanes; `None` if the spectra would take
     /// gigabytes.
     pub(crate) fn new(channels: usize, ratio: usize, lags: usize, lanes: usize) -> Option<Self> {

@@ -69,7 +69,7 @@ fn the_error_is_within_the_stated_bound() {
                 // Values from 1e-9 to 1e9.
                 taps.iter_mut().flatten().for_each(|tap| *tap *= 10f64.powf(9.0 * noise.next()));
             }
-            let len = Shape::new(n, m, phase_taps(&taps, m), 8).unwrap().len;
+            let len = TransformShape::new(n, m, phase_taps(&taps, m), 8).unwrap().len;
             let input = noise.samples(n * (2 * len + 50));
             let got = run(&fir_bank(taps.clone(), m), by(Algorithm::OverlapSave), &input);
             let error = relative_error(&taps, m, len, &input, f64::from(f32::EPSILON), &got);
@@ -93,7 +93,7 @@ fn long_prime_and_empty_filters_work() {
 
 #[test]
 fn recursive_banks_have_no_transforms() {
-    let filter = crate::StateSpace { a: vec![], b: vec![], c: vec![vec![]], d: vec![vec![1.0]] };
+    let filter = crate::StateMatrices { a: vec![], b: vec![], c: vec![vec![]], d: vec![vec![1.0]] };
     let bank = recursive_bank(filter);
     let refused = |algorithm| start(&bank, by(algorithm)).err();
     assert_eq!(refused(Algorithm::OverlapSave), Some(BuildError::Recursive { algorithm: "overlap-save" }));

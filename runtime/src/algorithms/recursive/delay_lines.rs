@@ -1,6 +1,6 @@
 //! What a state matrix is made of: states that are nothing but past inputs, and what is left.
 
-use super::StateSpace;
+use super::StateMatrices;
 use std::collections::BTreeMap;
 
 /// An input some frames ago: (channel, frames).
@@ -10,9 +10,9 @@ pub type DelayedInput = (usize, usize);
 /// y = sum taps u + sum c x, x+ = sum a x + sum b u, where u are inputs of this frame and of earlier ones.
 ///
 /// ```
-/// use hybank_runtime::{DelayLines, StateSpace};
+/// use hybank_runtime::{DelayLines, StateMatrices};
 /// // y[k] = u[k] + u[k - 1] / 4 + s[k] with s[k + 1] = s[k] / 2 + u[k]: the second state is u[k - 1].
-/// let lines = DelayLines::new(&StateSpace {
+/// let lines = DelayLines::new(&StateMatrices {
 ///     a: vec![vec![0.5, 0.0], vec![0.0, 0.0]],
 ///     b: vec![vec![1.0], vec![1.0]],
 ///     c: vec![vec![1.0, 0.25]],
@@ -35,7 +35,7 @@ pub struct DelayLines {
 
 impl DelayLines {
     /// The matrices have fitting shapes.
-    pub fn new(filter: &StateSpace) -> Self {
+    pub fn new(filter: &StateMatrices) -> Self {
         let delayed = delayed_inputs(filter);
         let core: Vec<usize> = (0..delayed.len()).filter(|&s| delayed[s].is_none()).collect();
         let read = |s: usize| filter.c.iter().map(move |row| row[s]);
@@ -103,7 +103,7 @@ fn add(
 }
 
 /// Which states are inputs of earlier frames: those that take over an input, or such a state, unchanged.
-fn delayed_inputs(filter: &StateSpace) -> Vec<Option<DelayedInput>> {
+fn delayed_inputs(filter: &StateMatrices) -> Vec<Option<DelayedInput>> {
     let ones: Vec<(Option<usize>, Option<usize>)> =
         filter.a.iter().zip(&filter.b).map(|(a, b)| (only_one(a), only_one(b))).collect();
     let zero = |row: &[f64]| row.iter().all(|&x| x == 0.0);
@@ -137,9 +137,9 @@ fn only_one(row: &[f64]) -> Option<usize> {
 mod tests {
     use super::*;
 
-    fn filter(a: &[&[f64]], b: &[&[f64]], c: &[&[f64]], d: &[&[f64]]) -> StateSpace {
+    fn filter(a: &[&[f64]], b: &[&[f64]], c: &[&[f64]], d: &[&[f64]]) -> StateMatrices {
         let rows = |m: &[&[f64]]| m.iter().map(|row| row.to_vec()).collect();
-        StateSpace { a: rows(a), b: rows(b), c: rows(c), d: rows(d) }
+        StateMatrices { a: rows(a), b: rows(b), c: rows(c), d: rows(d) }
     }
 
     #[test]

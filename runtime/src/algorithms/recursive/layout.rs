@@ -3,10 +3,12 @@
 use super::delay_lines::{DelayLines, DelayedInput};
 use crate::BuildError;
 use crate::aligned::Aligned;
-use crate::simd::{ColumnTile, FirKernel, Form, Polyphase, Recursion, SectionVector, Tiling, group_lanes};
+use crate::simd::{
+    ColumnTile, FirKernel, Polyphase, Recursion, RecursionForm, SectionVector, Tiling, group_lanes,
+};
 
 /// Where things lie: in a history of frames of N inputs, and in rows of S states.
-pub(super) struct Layout {
+pub(super) struct HistoryLayout {
     /// Of the recursion.
     lanes: usize,
     channels: usize,
@@ -19,7 +21,7 @@ pub(super) struct Layout {
     parallel: bool,
 }
 
-impl Layout {
+impl HistoryLayout {
     /// For N channels and M phases, and a recursion in vectors of `lanes`.
     pub(super) fn new(
         delay_lines: &DelayLines,
@@ -95,9 +97,9 @@ impl Layout {
         let columns = Columns { layout: self, delay_lines, occupants: self.occupants() };
         let form = if self.parallel {
             let vectors = (0..self.states).step_by(2 * self.lanes);
-            Form::Sections(vectors.map(|first| columns.section_vector(first)).collect())
+            RecursionForm::Sections(vectors.map(|first| columns.section_vector(first)).collect())
         } else {
-            Form::Dense(columns.tiles())
+            RecursionForm::Dense(columns.tiles())
         };
         Recursion { states: self.states, form }
     }
@@ -105,7 +107,7 @@ impl Layout {
 
 /// The columns of A and B, as the recursion takes them.
 struct Columns<'a> {
-    layout: &'a Layout,
+    layout: &'a HistoryLayout,
     delay_lines: &'a DelayLines,
     occupants: Vec<Option<usize>>,
 }

@@ -15,20 +15,22 @@ mod layout;
 mod tests;
 
 pub use self::delay_lines::{DelayLines, DelayedInput};
-use self::layout::Layout;
-use super::filter::{Facts, Filter};
-use crate::adapters::{Input, Output};
+use self::layout::HistoryLayout;
+use super::filter::{AlgorithmFacts, Filter};
+use crate::adapters::{FrameSink, FrameSource};
 use crate::aligned::Aligned;
 use crate::history::History;
-use crate::simd::{FirKernel, Form, Polyphase, Recursion, RecursionKernel, Segment, replace_not_finite};
-use crate::state::{Count, Numbers};
+use crate::simd::{
+    FirKernel, Polyphase, Recursion, RecursionForm, RecursionKernel, Segment, replace_not_finite,
+};
+use crate::state::{Count, StateNumbers};
 use crate::{BuildError, Isa};
 
 /// A filter in state space, one step per frame: x+ = a x + b u, y = c x + d u; u the N samples of a frame, y
 /// its M output samples. Row-major lists of rows.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
-pub struct StateSpace {
+pub struct StateMatrices {
     /// n x n.
     pub a: Vec<Vec<f64>>,
     /// n x N.
@@ -81,7 +83,7 @@ pub(crate) struct RecursiveState {
 impl Recursive {
     /// For N = `channels` and M = `ratio`.
     pub(crate) fn new(
-        filter: &StateSpace,
+        filter: &StateMatrices,
         channels: usize,
         ratio: usize,
         isa: Isa,
@@ -96,7 +98,7 @@ impl Recursive {
         check("d", &filter.d, ratio, channels)?;
         let delay_lines = DelayLines::new(filter);
         let (advance, fir) = (RecursionKernel::new(isa), FirKernel::new(isa));
-        let layout = Layout::new(&delay_lines, channels, ratio, advance.lanes, fir)?;
+        let layout = HistoryLayout::new(&delay_lines, channels, ratio, advance.lanes, fir)?;
         Ok(Self {
             channels,
             ratio,
@@ -111,7 +113,7 @@ impl Recursive {
 
     /// True if the states are second-order sections in parallel and run as such.
     fn is_parallel(&self) -> bool {
-        matches!(self.recursion.form, Form::Sections(_))
+        matches!(self.recursion.form, RecursionForm::Sections(_))
     }
 
     /// Filters the frames in the history's room.
@@ -129,8 +131,8 @@ impl Recursive {
 impl Filter for Recursive {
     type State = RecursiveState;
 
-    fn facts(&self) -> Facts {
-        Facts {
+    fn facts(&self) -> AlgorithmFacts {
+        AlgorithmFacts {
             name: if self.is_parallel() { "parallel-form" } else { "dense" },
             history: None,
             delay: 0,
@@ -164,7 +166,12 @@ impl Filter for Recursive {
         state.resets = 0;
     }
 
-    fn process(&self, state: &mut RecursiveState, input: &dyn Input, output: &mut dyn Output) -> u64 {
+    fn process(
+        &self,
+        state: &mut RecursiveState,
+        input: &dyn FrameSource,
+        output: &mut dyn FrameSink,
+    ) -> u64 {
         let (mut replaced, mut first) = (0, 0);
         while first < input.frames() {
             let frames = (input.frames() - first).min(BLOCK - state.phase_offset);
@@ -188,7 +195,7 @@ impl Filter for Recursive {
         state.rows[..state.states].iter().for_each(|&value| put(value));
     }
 
-    fn resume(&self, state: &mut RecursiveState, place: usize, numbers: Numbers<'_>) {
+    fn resume(&self, state: &mut RecursiveState, place: usize, numbers: StateNumbers<'_>) {
         Self::reset(state);
         state.history.resume(self.history, numbers);
         for (i, slot) in state.rows[..state.states].iter_mut().enumerate() {

@@ -4,7 +4,7 @@ use super::*;
 use crate::adapters::Interleaved;
 use crate::tests::support::{Noise, state_space_definition, worst};
 
-fn run(filter: &StateSpace, n: usize, m: usize, isa: Isa, input: &[f64], cut: usize) -> (Vec<f64>, bool) {
+fn run(filter: &StateMatrices, n: usize, m: usize, isa: Isa, input: &[f64], cut: usize) -> (Vec<f64>, bool) {
     let plan = Recursive::new(filter, n, m, isa).unwrap();
     let mut state = plan.state();
     let mut out = vec![0.0; input.len() / n * m];
@@ -14,7 +14,7 @@ fn run(filter: &StateSpace, n: usize, m: usize, isa: Isa, input: &[f64], cut: us
     (out, plan.is_parallel())
 }
 
-fn random(order: usize, n: usize, m: usize, blocks: Option<&[usize]>, noise: &mut Noise) -> StateSpace {
+fn random(order: usize, n: usize, m: usize, blocks: Option<&[usize]>, noise: &mut Noise) -> StateMatrices {
     let mut matrix = |rows: usize, cols: usize, scale: f64| -> Vec<Vec<f64>> {
         (0..rows).map(|_| (0..cols).map(|_| scale * noise.next()).collect()).collect()
     };
@@ -26,7 +26,7 @@ fn random(order: usize, n: usize, m: usize, blocks: Option<&[usize]>, noise: &mu
             row.iter_mut().enumerate().filter(|(j, _)| owner[*j] != owner[i]).for_each(|(_, x)| *x = 0.0);
         }
     }
-    StateSpace { a, b: matrix(order, n, 1.0), c: matrix(m, order, 1.0), d: matrix(m, n, 1.0) }
+    StateMatrices { a, b: matrix(order, n, 1.0), c: matrix(m, order, 1.0), d: matrix(m, n, 1.0) }
 }
 
 #[test]
@@ -57,7 +57,7 @@ fn every_shape_follows_its_definition_with_the_same_bits_for_every_cut() {
 
 /// The same filter with its inputs `frames` frames late, in a delay line that the output reads too: the form
 /// of designed banks.
-fn delayed(core: &StateSpace, frames: usize, noise: &mut Noise) -> StateSpace {
+fn delayed(core: &StateMatrices, frames: usize, noise: &mut Noise) -> StateMatrices {
     let (states, n) = (core.a.len(), core.d[0].len());
     let order = states + frames * n;
     let mut a = vec![vec![0.0; order]; order];
@@ -74,7 +74,7 @@ fn delayed(core: &StateSpace, frames: usize, noise: &mut Noise) -> StateSpace {
     let newest = |i: usize, u: usize| f64::from(u8::from(i == order - n + u));
     let b = (0..order).map(|i| (0..n).map(|u| newest(i, u)).collect()).collect();
     let read = |row: &Vec<f64>| row.iter().copied().chain((0..frames * n).map(|_| noise.next())).collect();
-    StateSpace { a, b, c: core.c.iter().map(read).collect(), d: core.d.clone() }
+    StateMatrices { a, b, c: core.c.iter().map(read).collect(), d: core.d.clone() }
 }
 
 #[test]
@@ -101,7 +101,7 @@ fn zero_columns_of_triangles_are_not_multiplied() {
     let mut filter = random(24, 1, 2, None, &mut noise);
     (0..24).for_each(|i| filter.a[i][..i].fill(0.0));
     let plan = Recursive::new(&filter, 1, 2, Isa::detect()).unwrap();
-    let Form::Dense(tiles) = &plan.recursion.form else { panic!("a triangle is no section") };
+    let RecursionForm::Dense(tiles) = &plan.recursion.form else { panic!("a triangle is no section") };
     let columns: Vec<usize> = tiles.iter().map(|tile| tile.columns.len()).collect();
     assert_eq!(columns[0], 24);
     assert!(columns[1..].iter().all(|&count| count < 24), "{columns:?}");
@@ -113,7 +113,7 @@ fn zero_columns_of_triangles_are_not_multiplied() {
 #[test]
 fn a_state_that_fades_away_becomes_zero() {
     let filter =
-        StateSpace { a: vec![vec![0.5]], b: vec![vec![1.0]], c: vec![vec![1.0]], d: vec![vec![0.0]] };
+        StateMatrices { a: vec![vec![0.5]], b: vec![vec![1.0]], c: vec![vec![1.0]], d: vec![vec![0.0]] };
     let plan = Recursive::new(&filter, 1, 1, Isa::detect()).unwrap();
     let mut state = plan.state();
     let mut input = vec![0.0; 1200];

@@ -1,26 +1,26 @@
 //! The FIR kernels of an instruction set, by the samples of a step and the phases of a group.
 
-use super::super::dispatch::{Element, Kernel, compiled, compiled_narrow, vector_lanes};
+use super::super::dispatch::{Kernel, SimdElement, compiled, compiled_narrow, vector_lanes};
 use super::super::isa::Isa;
 use super::super::vector::{Vector, group_lanes};
 use super::phases::Phases;
 use super::single::Single;
-use super::tiling::{Job, Tiling};
+use super::tiling::{FirJob, Tiling};
 use std::marker::PhantomData;
 
 /// Returns false if a sum that is checked is not finite, or the total of those that are.
-pub(super) type FirFn<T> = for<'a> unsafe fn(&'a Job<'a, T>) -> bool;
+pub(super) type FirFn<T> = for<'a> unsafe fn(&'a FirJob<'a, T>) -> bool;
 
 /// P phases with windows cut into steps of D samples.
-struct Fir<T, const D: usize, const P: usize>(PhantomData<T>);
+struct SteppedFir<T, const D: usize, const P: usize>(PhantomData<T>);
 
-impl<T: Element, const D: usize, const P: usize> Kernel for Fir<T, D, P> {
+impl<T: SimdElement, const D: usize, const P: usize> Kernel for SteppedFir<T, D, P> {
     type Sample = T;
-    type Job<'a> = &'a Job<'a, T>;
+    type Job<'a> = &'a FirJob<'a, T>;
     type Output = bool;
 
     #[inline(always)]
-    unsafe fn run<V: Vector<Sample = T>>(job: &Job<'_, T>) -> bool {
+    unsafe fn run<V: Vector<Sample = T>>(job: &FirJob<'_, T>) -> bool {
         if const { D > group_lanes::<T>() } {
             unreachable!("a step is at most a group");
         }
@@ -35,7 +35,7 @@ pub(crate) struct FirKernel<T> {
     sample: PhantomData<T>,
 }
 
-impl<T: Element> FirKernel<T> {
+impl<T: SimdElement> FirKernel<T> {
     /// The kernels for an instruction set.
     pub(crate) fn new(isa: Isa) -> Self {
         Self { isa, sample: PhantomData }
@@ -59,10 +59,10 @@ impl<T: Element> FirKernel<T> {
 
     fn of_depth<const D: usize>(self, width: usize) -> FirFn<T> {
         match width {
-            1 => compiled_narrow::<Fir<T, D, 1>>(self.isa),
-            2 => compiled::<Fir<T, D, 2>>(self.isa),
-            3 => compiled::<Fir<T, D, 3>>(self.isa),
-            _ => compiled::<Fir<T, D, 4>>(self.isa),
+            1 => compiled_narrow::<SteppedFir<T, D, 1>>(self.isa),
+            2 => compiled::<SteppedFir<T, D, 2>>(self.isa),
+            3 => compiled::<SteppedFir<T, D, 3>>(self.isa),
+            _ => compiled::<SteppedFir<T, D, 4>>(self.isa),
         }
     }
 }

@@ -13,12 +13,12 @@
 
 use super::super::dispatch::keep_branch;
 use super::super::vector::Vector;
-use super::tiling::{Chunk, Job, sized, tile_size};
+use super::tiling::{FirJob, FrameChunk, sized, tile_size};
 
 /// The work of one group of phases on all frames of a job.
 pub(super) struct Phases<'a, V: Vector, const D: usize, const P: usize> {
-    job: &'a Job<'a, V::Sample>,
-    chunk: Chunk<V::Sample>,
+    job: &'a FirJob<'a, V::Sample>,
+    chunk: FrameChunk<V::Sample>,
     /// The tile in scratch: its first frame and its vectors, 0 if there is none.
     first: usize,
     waiting: usize,
@@ -52,8 +52,8 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     /// # Safety
     /// As for [`Vector`].
     #[inline(always)]
-    pub(super) unsafe fn new(job: &'a Job<'a, V::Sample>) -> Self {
-        Self { job, chunk: Chunk::NONE, first: 0, waiting: 0, total: V::zero() }
+    pub(super) unsafe fn new(job: &'a FirJob<'a, V::Sample>) -> Self {
+        Self { job, chunk: FrameChunk::NONE, first: 0, waiting: 0, total: V::zero() }
     }
 
     /// All frames.
@@ -62,8 +62,8 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     /// As for [`Vector`]; the job's memory is there.
     #[inline(always)]
     pub(super) unsafe fn run(&mut self) -> bool {
-        for &Chunk { x, out, frames } in self.job.chunks {
-            self.chunk = Chunk { x, out: out.wrapping_add(self.job.first), frames };
+        for &FrameChunk { x, out, frames } in self.job.chunks {
+            self.chunk = FrameChunk { x, out: out.wrapping_add(self.job.first), frames };
             self.run_chunk();
         }
         self.total.finite()

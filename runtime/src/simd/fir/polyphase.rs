@@ -1,11 +1,11 @@
 //! Polyphase filters with their coefficients in the order of use, and the checked calls of the FIR kernels.
 
-use super::super::dispatch::Element;
+use super::super::dispatch::SimdElement;
 use super::super::vector::group_lanes;
 #[cfg(test)]
 use super::super::work;
 use super::kernel::{FirFn, FirKernel};
-use super::tiling::{Chunk, Job, SCRATCH, Tiling};
+use super::tiling::{FirJob, FrameChunk, SCRATCH, Tiling};
 use crate::aligned::Aligned;
 
 /// Segments of a call.
@@ -15,7 +15,7 @@ const VECTOR_OUTPUTS: usize = 64;
 
 /// FIR filters from windows of frames to M phases.
 #[derive(Debug)]
-pub(crate) struct Polyphase<T: Element> {
+pub(crate) struct Polyphase<T: SimdElement> {
     tiling: Tiling,
     /// M.
     ratio: usize,
@@ -24,7 +24,7 @@ pub(crate) struct Polyphase<T: Element> {
 
 /// One to four phases that are computed together.
 #[derive(Debug)]
-struct PhaseGroup<T: Element> {
+struct PhaseGroup<T: SimdElement> {
     first: usize,
     /// P; 1 only where there is no other phase.
     width: usize,
@@ -48,7 +48,7 @@ pub(crate) struct Segment<'a, T> {
 #[repr(align(64))]
 struct Scratch<T>([T; SCRATCH]);
 
-impl<T: Element> Polyphase<T> {
+impl<T: SimdElement> Polyphase<T> {
     /// `coefficient(e, p)`: of the sample e before the last one of a frame, for phase p of M = `ratio`.
     pub(crate) fn new(
         kernel: FirKernel<T>,
@@ -81,7 +81,7 @@ impl<T: Element> Polyphase<T> {
     /// # Panics
     /// If a segment or `out` is too short for that, or if there are more than two segments.
     pub(crate) fn run(&self, segments: &[Segment<'_, T>], out: &mut [T]) -> bool {
-        let (mut chunks, mut whole) = ([Chunk::NONE; SEGMENTS], true);
+        let (mut chunks, mut whole) = ([FrameChunk::NONE; SEGMENTS], true);
         // All outputs are written through this one pointer, here and in the kernels.
         let room = out.as_mut_ptr();
         for (chunk, segment) in chunks[..segments.len()].iter_mut().zip(segments) {
@@ -93,7 +93,7 @@ impl<T: Element> Polyphase<T> {
         let mut scratch = std::mem::MaybeUninit::<Scratch<T>>::uninit();
         let mut finite = true;
         for group in &self.groups {
-            let job = Job {
+            let job = FirJob {
                 tiling: &self.tiling,
                 coefficients: group.coefficients.as_ptr(),
                 chunks: &chunks[..segments.len()],
@@ -118,12 +118,12 @@ impl<T: Element> Polyphase<T> {
     /// kernels write to the place after them too, which belongs to the same frame, to a later one, or to
     /// none.
     #[inline(always)]
-    fn chunk(&self, segment: &Segment<'_, T>, room: *mut T, len: usize) -> Chunk<T> {
+    fn chunk(&self, segment: &Segment<'_, T>, room: *mut T, len: usize) -> FrameChunk<T> {
         let Segment { x, first, frames } = *segment;
         let Tiling { history, hop, depth, vector, .. } = self.tiling;
         let padded = (frames + vector - 1) & !(vector - 1);
         assert!(history + padded * hop <= x.len() && (first + frames) * self.ratio <= len);
-        Chunk {
+        FrameChunk {
             x: x.as_ptr().wrapping_add(history + hop - depth),
             out: room.wrapping_add(first * self.ratio),
             frames: frames.saturating_sub(usize::from(self.ratio == 3)) & !(vector - 1),
@@ -136,10 +136,10 @@ impl<T: Element> Polyphase<T> {
 ///
 /// # Safety
 /// The job, the chunk and the segment are those of a checked call, whose outputs begin at `room`.
-unsafe fn remainder<T: Element>(
+unsafe fn remainder<T: SimdElement>(
     group: &PhaseGroup<T>,
-    job: &Job<'_, T>,
-    chunk: &Chunk<T>,
+    job: &FirJob<'_, T>,
+    chunk: &FrameChunk<T>,
     segment: &Segment<'_, T>,
     room: *mut T,
 ) -> bool {
@@ -150,9 +150,9 @@ unsafe fn remainder<T: Element>(
     let mut outputs = [T::default(); VECTOR_OUTPUTS];
     let hop = group.width.next_power_of_two();
     let x = chunk.x.wrapping_add(chunk.frames * job.tiling.hop);
-    let chunks = [Chunk { x, out: outputs.as_mut_ptr(), frames: job.tiling.vector }];
+    let chunks = [FrameChunk { x, out: outputs.as_mut_ptr(), frames: job.tiling.vector }];
     // A vector has at most 16 frames, so the scratch holds them.
-    let finite = (group.kernel)(&Job { chunks: &chunks, first: 0, out_hop: hop, ..*job });
+    let finite = (group.kernel)(&FirJob { chunks: &chunks, first: 0, out_hop: hop, ..*job });
     for (t, phases) in outputs.chunks_exact(hop).enumerate().take(left) {
         let frame = room.add((segment.first + chunk.frames + t) * job.out_hop);
         frame.add(group.first).copy_from_nonoverlapping(phases.as_ptr(), group.width);
@@ -177,7 +177,7 @@ pub(crate) fn widths(phases: usize) -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// Coefficients of phases first .. first + width in the order of use, in each step the samples as they lie.
-fn coefficients<T: Element>(
+fn coefficients<T: SimdElement>(
     tiling: &Tiling,
     first: usize,
     width: usize,

@@ -12,11 +12,11 @@
 
 use super::super::dispatch::keep_branch;
 use super::super::vector::Vector;
-use super::tiling::{Chunk, Job, Pairing, sized, tile_size};
+use super::tiling::{FirJob, FrameChunk, Pairing, sized, tile_size};
 
 /// A single phase on all frames of a job, in vectors of one group.
 pub(super) struct Single<'a, V: Vector, const D: usize> {
-    job: &'a Job<'a, V::Sample>,
+    job: &'a FirJob<'a, V::Sample>,
     /// Of the sums that are checked, lane by lane: not finite if one of them is not.
     total: V,
 }
@@ -25,7 +25,7 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
     /// # Safety
     /// As for [`Vector`].
     #[inline(always)]
-    pub(super) unsafe fn new(job: &'a Job<'a, V::Sample>) -> Self {
+    pub(super) unsafe fn new(job: &'a FirJob<'a, V::Sample>) -> Self {
         Self { job, total: V::zero() }
     }
 
@@ -43,8 +43,8 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
 
     /// Blocks of as many frames as a group has lanes: their sums are added together.
     #[inline(always)]
-    unsafe fn chunk(&mut self, &Chunk { x, out, frames }: &Chunk<V::Sample>) {
-        let Job { tiling, scratch, .. } = *self.job;
+    unsafe fn chunk(&mut self, &FrameChunk { x, out, frames }: &FrameChunk<V::Sample>) {
+        let FirJob { tiling, scratch, .. } = *self.job;
         let pairing = tiling.pairing;
         // Vectors of a block in each of the tiles, and blocks at once: of twelve sums three blocks of 8 are
         // two tiles.

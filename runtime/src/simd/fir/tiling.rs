@@ -103,7 +103,7 @@ impl Pairing {
 
 /// Frames one after another, checked, as far as they fill vectors.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Chunk<T> {
+pub(super) struct FrameChunk<T> {
     /// The newest step of the first frame.
     pub(super) x: *const T,
     /// The outputs of the first frame.
@@ -112,16 +112,16 @@ pub(super) struct Chunk<T> {
     pub(super) frames: usize,
 }
 
-impl<T> Chunk<T> {
+impl<T> FrameChunk<T> {
     pub(super) const NONE: Self = Self { x: std::ptr::null(), out: std::ptr::null_mut(), frames: 0 };
 }
 
 /// One call of a kernel, checked.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Job<'a, T> {
+pub(super) struct FirJob<'a, T> {
     pub(super) tiling: &'a Tiling,
     pub(super) coefficients: *const T,
-    pub(super) chunks: &'a [Chunk<T>],
+    pub(super) chunks: &'a [FrameChunk<T>],
     /// The first phase.
     pub(super) first: usize,
     pub(super) out_hop: usize,

@@ -75,14 +75,14 @@ fn what_complex_captures_do_not_tell_is_said() {
     let records = complex_tones(&truth, &[Hertz(-41e3)], 2048, 1e-4, &mut dice);
     let found = by_tones(&spec, &records, &[-41e3]).unwrap();
     let offsets = found.warnings.iter().find_map(|warning| match warning {
-        Warning::ComplexOffsets { offsets } => Some(offsets.clone()),
+        CalibrationWarning::ComplexOffsets { offsets } => Some(offsets.clone()),
         _ => None,
     });
     assert!(offsets.unwrap().iter().flatten().all(|offset| (offset - 0.25).abs() < 1e-4));
     assert!(found.channels.iter().all(|channel| channel.offset.is_none()));
     let other = by_tones(&spec, &records, &[41e3]);
     assert!(matches!(other, Err(CalibrateError::OtherSign { .. })), "{other:?}");
-    let blind = calibrate(&spec, &records, &CalibrationSignal::Any, Settings::default());
+    let blind = calibrate(&spec, &records, &CalibrationSignal::Any, CalibrationSettings::default());
     assert!(matches!(blind, Err(CalibrateError::ComplexSamples { complex: 4, records: 4 })));
     let mut mixed = records.clone();
     mixed[1].imaginary = None;

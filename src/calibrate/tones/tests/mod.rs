@@ -8,7 +8,8 @@ use crate::calibrate::testbench::{
     assert_covers, errors, gaussian, interleaved, random_errors, tones, trials, with_errors,
 };
 use crate::calibrate::{
-    CalibrateError, Calibration, CalibrationSignal, Cutoff, Fit, Record, Settings, Warning, calibrate,
+    CalibrateError, Calibration, CalibrationSettings, CalibrationSignal, CalibrationWarning, Cutoff,
+    FittedValues, Record, calibrate,
 };
 use crate::random::Random;
 use crate::spec::Spec;
@@ -19,12 +20,15 @@ const SKEWS: [f64; 4] = [0.01, 0.01, 0.002, 0.0];
 
 fn by_tones(spec: &Spec, records: &[Record], given: &[f64]) -> Result<Calibration, CalibrateError> {
     let given: Vec<Hertz> = given.iter().map(|&f| Hertz(f)).collect();
-    calibrate(spec, records, &CalibrationSignal::Tones(given), Settings::default())
+    calibrate(spec, records, &CalibrationSignal::Tones(given), CalibrationSettings::default())
 }
 
 fn with_cutoff(spec: &Spec, records: &[Record], given: &[f64]) -> Result<Calibration, CalibrateError> {
     let given: Vec<Hertz> = given.iter().map(|&f| Hertz(f)).collect();
-    let settings = Settings { fit: Fit { cutoff: Some(Cutoff::Whole), ..Fit::default() }, reference: 0 };
+    let settings = CalibrationSettings {
+        fit: FittedValues { cutoff: Some(Cutoff::Whole), ..FittedValues::default() },
+        reference: 0,
+    };
     calibrate(spec, records, &CalibrationSignal::Tones(given), settings)
 }
 
@@ -137,12 +141,15 @@ fn a_cutoff_error_that_is_not_fitted_is_noted_and_widens_the_intervals() {
     let records = tones(&truth, &hertz(&list), 2048, 1e-4, &mut dice);
     let found = by_tones(&spec, &records, &list).unwrap();
     assert!(
-        found.warnings.iter().any(|r| matches!(r, Warning::TonesDisagree { misfit } if *misfit > 3.0)),
+        found
+            .warnings
+            .iter()
+            .any(|r| matches!(r, CalibrationWarning::TonesDisagree { misfit } if *misfit > 3.0)),
         "{found:?}"
     );
     // One per cent of the cut-off is about 0.01 / (2 pi 2 MHz) = 0.8 ns of delay.
     let assumed = found.warnings.iter().find_map(|r| match r {
-        Warning::CutoffAssumed { delay } => Some(delay.0),
+        CalibrationWarning::CutoffAssumed { delay } => Some(delay.0),
         _ => None,
     });
     assert!(assumed.is_some_and(|delay| (6e-4..9e-4).contains(&delay)), "{assumed:?}");
@@ -165,17 +172,17 @@ fn harmonics_on_the_tone_and_few_phases_are_noted() {
         let records = tones(&spec, &[Hertz(tone)], 2000, 1e-4, dice);
         by_tones(&spec, &records, &[tone]).unwrap().warnings
     };
-    let harmonic = |warnings: &[Warning]| {
-        warnings
-            .iter()
-            .find_map(|r| if let Warning::HarmonicOnTone { order, .. } = r { Some(*order) } else { None })
+    let harmonic = |warnings: &[CalibrationWarning]| {
+        warnings.iter().find_map(|r| {
+            if let CalibrationWarning::HarmonicOnTone { order, .. } = r { Some(*order) } else { None }
+        })
     };
     // A quarter and a third of the slow rate of 250 kHz.
     assert_eq!(harmonic(&warnings(62.5e3, &mut dice)), Some(3));
     assert_eq!(harmonic(&warnings(250e3 / 3.0, &mut dice)), Some(2));
     assert_eq!(harmonic(&warnings(47.11e3, &mut dice)), None);
     let few = warnings(250e3 * 7.0 / 25.0, &mut dice);
-    assert!(few.iter().any(|r| matches!(r, Warning::FewPhases { phases: 25, .. })), "{few:?}");
+    assert!(few.iter().any(|r| matches!(r, CalibrationWarning::FewPhases { phases: 25, .. })), "{few:?}");
 }
 
 /// Quantisation to 8 bits of a tone with 25 phases errs by the same amount however long the record is: the
@@ -214,7 +221,10 @@ fn a_delay_beyond_the_period_of_a_tone_is_found_by_a_lower_one() {
     let delay = |found: &Calibration| found.channels[1].delay.unwrap().value.0;
     assert!((delay(&found) - (1.7 - 1.0 / 1.06)).abs() < 1e-3, "{}", delay(&found));
     assert!(found.modulus.is_some_and(|m| (m.0 - 1.0 / 1.06).abs() < 1e-6));
-    assert!(found.warnings.iter().any(|r| matches!(r, Warning::DelayModulo { channel: 2, .. })), "{found:?}");
+    assert!(
+        found.warnings.iter().any(|r| matches!(r, CalibrationWarning::DelayModulo { channel: 2, .. })),
+        "{found:?}"
+    );
     let two = tones(&truth, &hertz(&[1.06e6, 101e3]), 2048, 1e-4, &mut dice);
     let found = by_tones(&spec, &two, &[1.06e6, 101e3]).unwrap();
     assert!((delay(&found) - 1.7).abs() < 1e-3, "{}", delay(&found));
@@ -274,11 +284,14 @@ fn the_reference_keeps_the_values_of_the_spec() {
     let (spec, mut dice) = (interleaved(), Random(16));
     let truth = with_errors(&spec, &random_errors(&mut dice, 4, SKEWS));
     let records = tones(&truth, &[Hertz(203e3)], 2048, 1e-4, &mut dice);
-    let settings = Settings { reference: 2, ..Settings::default() };
+    let settings = CalibrationSettings { reference: 2, ..CalibrationSettings::default() };
     let found = calibrate(&spec, &records, &CalibrationSignal::Tones(vec![Hertz(203e3)]), settings).unwrap();
     assert_eq!((found.channels[2].delay, found.channels[2].gain), (None, None));
     assert!(errors(&truth, &found).scaled.iter().all(|x| x.abs() < 5.0));
-    let only_gain = Settings { fit: Fit { delay: false, offset: false, ..Fit::default() }, reference: 0 };
+    let only_gain = CalibrationSettings {
+        fit: FittedValues { delay: false, offset: false, ..FittedValues::default() },
+        reference: 0,
+    };
     let found = calibrate(&spec, &records, &CalibrationSignal::Tones(vec![Hertz(203e3)]), only_gain).unwrap();
     assert!(found.channels.iter().all(|c| c.delay.is_none() && c.offset.is_none()));
 }

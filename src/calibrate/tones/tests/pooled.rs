@@ -6,7 +6,8 @@ use crate::calibrate::testbench::{
     assert_covers, errors, interleaved, random_errors, tones, trials, with_errors,
 };
 use crate::calibrate::{
-    Acquisition, CalibrateError, Calibration, CalibrationSignal, Record, Settings, Warning, calibrate_pooled,
+    Acquisition, CalibrateError, Calibration, CalibrationSettings, CalibrationSignal, CalibrationWarning,
+    Record, calibrate_pooled,
 };
 use crate::random::Random;
 use crate::spec::Spec;
@@ -19,7 +20,7 @@ const NAMES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
 fn pooled(spec: &Spec, all: &[Vec<Record>], given: &[f64]) -> Result<Calibration, CalibrateError> {
     let all: Vec<Acquisition<'_>> =
         all.iter().zip(NAMES).map(|(records, name)| Acquisition { name, records }).collect();
-    calibrate_pooled(spec, &all, &CalibrationSignal::Tones(hertz(given)), Settings::default())
+    calibrate_pooled(spec, &all, &CalibrationSignal::Tones(hertz(given)), CalibrationSettings::default())
 }
 
 fn acquired(truth: &Spec, dice: &mut Random) -> Vec<Vec<Record>> {
@@ -41,7 +42,8 @@ fn intervals_of_pooled_acquisitions_are_narrower_and_cover() {
         let weight = |found: &Calibration| found.channels[2].delay.unwrap().sigma.0.powi(-2);
         let alone = all.iter().zip(LIST).map(|(one, tone)| by_tones(&spec, one, &[tone]).unwrap());
         let sum: f64 = alone.map(|found| weight(&found)).sum();
-        let disagrees = found.warnings.iter().any(|warning| matches!(warning, Warning::TonesDisagree { .. }));
+        let disagrees =
+            found.warnings.iter().any(|warning| matches!(warning, CalibrationWarning::TonesDisagree { .. }));
         let widening = if disagrees { found.misfit.unwrap().powi(2) } else { 1.0 };
         assert!((weight(&found) * widening / sum - 1.0).abs() < 0.02, "{trial}");
     }
@@ -55,14 +57,17 @@ fn an_acquisition_that_contradicts_the_others_is_named() {
     let with = |delay| with_errors(&spec, &shift(delay)[..2]);
     let mut all = acquired(&with(0.004), &mut dice);
     let agreeing = pooled(&spec, &all, &LIST).unwrap();
-    assert!(!agreeing.warnings.iter().any(|w| matches!(w, Warning::Outlying { .. })), "{agreeing:?}");
+    assert!(
+        !agreeing.warnings.iter().any(|w| matches!(w, CalibrationWarning::Outlying { .. })),
+        "{agreeing:?}"
+    );
     all[3] = tones(&with(-0.03), &[Hertz(LIST[3])], 512, 1e-3, &mut dice);
     let found = pooled(&spec, &all, &LIST).unwrap();
     let outlying: Vec<&str> = found
         .warnings
         .iter()
         .filter_map(|warning| match warning {
-            Warning::Outlying { name, .. } => Some(name.as_str()),
+            CalibrationWarning::Outlying { name, .. } => Some(name.as_str()),
             _ => None,
         })
         .collect();
@@ -79,7 +84,8 @@ fn faults_name_the_acquisition() {
     let short = pooled(&spec, &all, &LIST).unwrap_err().to_string();
     assert!(short.starts_with("b: captures: 3, but channels in the spec: 4"), "{short}");
     let any = [Acquisition { name: "a", records: &all[0] }; 2];
-    let refused = calibrate_pooled(&spec, &any, &CalibrationSignal::Any, Settings::default()).unwrap_err();
+    let refused =
+        calibrate_pooled(&spec, &any, &CalibrationSignal::Any, CalibrationSettings::default()).unwrap_err();
     assert_eq!(refused, CalibrateError::NotPooled { acquisitions: 2 });
 }
 

@@ -2,8 +2,8 @@
 
 use crate::calibrate::testbench::{assert_covers, errors, tones, trials, with_errors};
 use crate::calibrate::{
-    CalibrateError, Calibration, CalibrationSignal, Cutoff, Fit, Record, Settings, Warning, applied,
-    calibrate,
+    CalibrateError, Calibration, CalibrationSettings, CalibrationSignal, CalibrationWarning, Cutoff,
+    FittedValues, Record, applied, calibrate,
 };
 use crate::random::Random;
 use crate::spec::{FilterSpec, Spec};
@@ -32,7 +32,8 @@ fn with_pole(spec: &Spec, dice: &mut Random, factor: f64) -> Spec {
 }
 
 fn fitted(spec: &Spec, records: &[Record], cutoff: Option<Cutoff>) -> Result<Calibration, CalibrateError> {
-    let settings = Settings { fit: Fit { cutoff, ..Fit::default() }, reference: 0 };
+    let settings =
+        CalibrationSettings { fit: FittedValues { cutoff, ..FittedValues::default() }, reference: 0 };
     calibrate(spec, records, &CalibrationSignal::Tones(LIST.map(Hertz).to_vec()), settings)
 }
 
@@ -66,7 +67,7 @@ fn the_stage_that_explains_a_misfit_is_named() {
     for cutoff in [None, Some(Cutoff::Whole), Some(Cutoff::Stage(0))] {
         let found = fitted(&spec, &records, cutoff).unwrap();
         let explained = found.warnings.iter().find_map(|warning| match warning {
-            Warning::CutoffExplains { fit, misfit } => Some((fit.cutoff, *misfit)),
+            CalibrationWarning::CutoffExplains { fit, misfit } => Some((fit.cutoff, *misfit)),
             _ => None,
         });
         let (part, misfit) = explained.unwrap();

@@ -35,7 +35,7 @@ fn a_signal_is_a_stage_that_all_front_ends_share() {
     for w in SIGNALS {
         for method in ["method = \"fir\", taps = 16", "method = \"iir\"", "method = \"h2\""] {
             let [with_signal, by_hand] =
-                both(w, method).map(|spec| design(&spec, &Options::without_proof()).unwrap());
+                both(w, method).map(|spec| design(&spec, &DesignOptions::without_proof()).unwrap());
             let norms = [&with_signal, &by_hand].map(|design| design.bank.gamma.norm.unwrap());
             assert!((norms[0] / norms[1] - 1.0).abs() < 2e-6, "{w} {method}: {norms:?}");
             // The bank of one way has the same error when the other way judges it.
@@ -54,7 +54,7 @@ fn a_signal_is_a_stage_that_all_front_ends_share() {
 fn gammas_are_proven_relative_to_the_signal() {
     for w in SIGNALS {
         let [spec, _] = both(w, "method = \"fir\", taps = 16");
-        let design = design(&spec, &Options::default()).unwrap();
+        let design = design(&spec, &DesignOptions::default()).unwrap();
         let proven = design.proof.unwrap();
         let gamma = design.bank.gamma;
         let norm = gamma.norm.unwrap();
@@ -80,7 +80,7 @@ fn a_band_is_designed_for() {
         Spec::from_toml(&text, "spec.toml").unwrap()
     };
     let gamma = |signal: &str| {
-        let design = design(&spec(signal), &Options::without_proof()).unwrap();
+        let design = design(&spec(signal), &DesignOptions::without_proof()).unwrap();
         (design.bank.gamma.norm.unwrap(), design.bank.spec.unwrap().signal.map(|signal| signal.floor_db))
     };
     assert_eq!(gamma("").1, None);

@@ -7,7 +7,7 @@
 use crate::bank::SynthesisFilters;
 use crate::design::filters::lifted;
 use crate::design::problem::Problem;
-use crate::design::{Design, LiftedPlant, Options, analyze_mean, design};
+use crate::design::{Design, DesignOptions, LiftedPlant, analyze_mean, design};
 use crate::figures::Figures;
 use crate::linalg::Complex;
 use crate::lti::gramian::h2_norm;
@@ -51,7 +51,7 @@ impl Case {
 
     /// Rms of the error and of the noise together.
     fn rms(&self) -> f64 {
-        total(&design(&self.spec(), &Options::without_proof()).unwrap())
+        total(&design(&self.spec(), &DesignOptions::without_proof()).unwrap())
     }
 }
 
@@ -125,11 +125,11 @@ fn check_rates(mut case: Case, converters: &[(&Converter, f64)], golden: f64) {
         .iter()
         .flat_map(|(converter, period)| virtual_channels(frame, *period, converter))
         .collect();
-    let own = design(&own_rates(&case, converters), &Options::without_proof()).unwrap();
+    let own = design(&own_rates(&case, converters), &DesignOptions::without_proof()).unwrap();
     let by_hand = shifted(case);
     check(&by_hand, golden);
     assert!((total(&own) - golden).abs() < 1e-10, "{} instead of {golden}", total(&own));
-    let by_hand = design(&by_hand.spec(), &Options::without_proof()).unwrap().bank;
+    let by_hand = design(&by_hand.spec(), &DesignOptions::without_proof()).unwrap().bank;
     assert_eq!((own.bank.latency, own.bank.channel_count()), (by_hand.latency, converters.len()));
     let (SynthesisFilters::Fir(a), SynthesisFilters::Fir(b)) = (&own.bank.filters, &by_hand.filters) else {
         panic!("taps")
@@ -236,7 +236,7 @@ fn banks_for_a_band_are_those_of_least_squares() {
              target.filter = {{ family = \"butterworth\", order = {order}, cutoff = {cutoff} }}\n"
         );
         let spec = Spec::from_toml(&text, "spec.toml").unwrap();
-        let figures = Figures::new(&design(&spec, &Options::without_proof()).unwrap().bank).unwrap();
+        let figures = Figures::new(&design(&spec, &DesignOptions::without_proof()).unwrap().bank).unwrap();
         let [found, spur] = [figures.snr.total_db.0, -figures.image.unwrap().db.0];
         assert!(
             (found - snr).abs() < 0.1 && (spur - image).abs() < 0.1,
@@ -257,7 +257,7 @@ fn no_other_taps_are_better() {
         let case = Case { ratio: 3, latency: 4, taps: Some(taps), target: filter.clone(), converters };
         let mut spec = case.spec();
         (spec.channels[1].gain, spec.channels[3].gain) = (-1.7, 1e-3);
-        let designed = design(&spec, &Options::without_proof()).unwrap();
+        let designed = design(&spec, &DesignOptions::without_proof()).unwrap();
         let least = total(&designed);
         let SynthesisFilters::Fir(best) = &designed.bank.filters else { panic!("taps") };
         for (i, n) in (0..4).flat_map(|i| (0..taps).map(move |n| (i, n))) {
@@ -310,7 +310,7 @@ fn uncertain(noise: f64, deviations: [f64; 2]) -> Design {
         reference: Some(0),
         ..UncertaintySpec::default()
     });
-    design(&spec, &Options::without_proof()).unwrap()
+    design(&spec, &DesignOptions::without_proof()).unwrap()
 }
 
 /// Origin as above, with cross-spectra times the characteristic functions.
@@ -322,7 +322,7 @@ fn uncertain_delays_are_averaged_over() {
         assert!((found - golden).abs() < 2e-10, "{deviation}: {found} {golden}");
         // One channel alone leaves 0.04988204, and the bank for exact delays far more.
         let nominal =
-            crate::design::design(&thesis(1e-3, Some(22)).spec(), &Options::without_proof()).unwrap();
+            crate::design::design(&thesis(1e-3, Some(22)).spec(), &DesignOptions::without_proof()).unwrap();
         let careless = mean_over_second_delay(&nominal, deviation);
         assert!(found < 0.04988204 && careless > 0.0574, "{found} {careless}");
     }
@@ -348,7 +348,7 @@ fn uncertain_delays_make_h2_fir() {
     let mut spec = thesis(1e-3, None).spec();
     spec.uncertainty =
         Some(UncertaintySpec { delay: Some(OneOrEach::Same(Seconds(0.1))), ..UncertaintySpec::default() });
-    let design = design(&spec, &Options::without_proof()).unwrap();
+    let design = design(&spec, &DesignOptions::without_proof()).unwrap();
     assert!(design.sizing.taps_chosen && matches!(design.bank.filters, SynthesisFilters::Fir(_)));
     spec.design.order = Some(3);
     assert!(spec.check().is_err());

@@ -1,6 +1,6 @@
 //! Robust optima against a semidefinite program, and the worst case that the file states.
 
-use crate::design::{Options, design, norm_at};
+use crate::design::{Design, DesignOptions, RobustStudy, Study, design, norm_at};
 use crate::random::Random;
 use crate::spec::{ErrorPoint, Spec};
 use crate::units::FastPeriods;
@@ -14,14 +14,19 @@ fn thesis(half: f64) -> Spec {
     Spec::from_toml(&text, "spec.toml").unwrap()
 }
 
+fn study(design: &Design) -> RobustStudy {
+    let Study::Fir { robust, .. } = &design.study else { unreachable!() };
+    robust.clone().unwrap()
+}
+
 /// By an independent semidefinite program on 5 x 5 delays and 61 frequencies.
 #[test]
 fn robust_optima_are_those_of_a_semidefinite_program() {
     for (half, robust, nominal) in
         [(0.05, 0.0421756, 0.0421799), (0.1, 0.0442877, 0.0478338), (0.2, 0.0635326, 0.0682)]
     {
-        let designed = design(&thesis(half), &Options::without_proof()).unwrap();
-        let study = designed.robust.unwrap();
+        let designed = design(&thesis(half), &DesignOptions::without_proof()).unwrap();
+        let study = study(&designed);
         assert!((study.robust.largest_found / robust - 1.0).abs() < 1e-3, "{study:?}");
         assert!((study.nominal.largest_found / nominal - 1.0).abs() < 1e-3, "{study:?}");
         assert!(
@@ -42,8 +47,8 @@ fn flat_optima_are_reached_and_random_points_are_no_worse() {
     for half in [0.1, 0.2, 0.3] {
         let mut spec = thesis(half);
         spec.uncertainty.as_mut().unwrap().reference = Some(1);
-        let designed = design(&spec, &Options::without_proof()).unwrap();
-        let study = designed.robust.unwrap();
+        let designed = design(&spec, &DesignOptions::without_proof()).unwrap();
+        let study = study(&designed);
         assert!(
             study.lower <= study.robust.largest_found
                 && study.lower > study.robust.largest_found * (1.0 - 1e-3),
@@ -62,7 +67,7 @@ fn flat_optima_are_reached_and_random_points_are_no_worse() {
 /// The file states a worst case that `verify` proves, and it refuses a smaller one.
 #[test]
 fn the_worst_case_is_stated_and_proven() {
-    let mut bank = design(&thesis(0.1), &Options::default()).unwrap().bank;
+    let mut bank = design(&thesis(0.1), &DesignOptions::default()).unwrap().bank;
     let stated = bank.gamma.worst_case.unwrap();
     assert!(stated > 0.0442877 * (1.0 - 1e-3) && stated < 0.0442877 * 2.2, "{stated}");
     assert!(crate::verify::verify(&bank).is_ok());
@@ -75,10 +80,11 @@ fn the_worst_case_is_stated_and_proven() {
 fn a_table_without_errors_changes_nothing() {
     let plain = Spec { uncertainty: None, ..thesis(0.1) };
     let (with, without) = (
-        design(&thesis(0.0), &Options::without_proof()).unwrap(),
-        design(&plain, &Options::without_proof()).unwrap(),
+        design(&thesis(0.0), &DesignOptions::without_proof()).unwrap(),
+        design(&plain, &DesignOptions::without_proof()).unwrap(),
     );
-    assert_eq!((with.bank.filters, with.robust), (without.bank.filters, None));
+    assert!(matches!(with.study, Study::Fir { robust: None, .. }));
+    assert_eq!(with.bank.filters, without.bank.filters);
 }
 
 /// Beside narrow resonances the error peaks between the points of a uniform grid. The least worst case of
@@ -93,7 +99,7 @@ fn peaks_beside_narrow_resonances_are_found() {
         design = { method = \"fir\", taps = 5 }\n\
         uncertainty = { delay_samples = [0.0, 0.12157, 0.0036], gain = [0.0, 0.00081, 0.03398] }\n";
     let spec = Spec::from_toml(text, "spec.toml").unwrap();
-    let study = design(&spec, &Options::without_proof()).unwrap().robust.unwrap();
+    let study = study(&design(&spec, &DesignOptions::without_proof()).unwrap());
     assert!((study.robust.largest_found / 0.671295 - 1.0).abs() < 1e-3, "{study:?}");
     assert!(
         study.lower <= study.robust.largest_found && study.lower > 0.999 * study.robust.largest_found,
@@ -113,9 +119,10 @@ fn no_corner_is_worse_than_what_was_found() {
         [uncertainty]\ndelay = [0.02518, 0.047507, 0.0625434]\ngain = [0.0242652, 0.0432963, 0.0166312]\n\
         cutoff = [0.0036178, 0.0597556, 0.0032301]\nreference = 0\n";
     let spec = Spec::from_toml(text, "spec.toml").unwrap();
-    let robust = design(&spec, &Options::without_proof()).unwrap();
-    let nominal = design(&Spec { uncertainty: None, ..spec.clone() }, &Options::without_proof()).unwrap();
-    let study = robust.robust.unwrap();
+    let robust = design(&spec, &DesignOptions::without_proof()).unwrap();
+    let nominal =
+        design(&Spec { uncertainty: None, ..spec.clone() }, &DesignOptions::without_proof()).unwrap();
+    let study = study(&robust);
     let errors = spec.error_box().unwrap();
     let mut random = Random(3);
     for sample in 0..600 {
@@ -163,7 +170,7 @@ fn robust_designs_reach_their_bound_and_win_what_the_table_says() {
                         delays.collect::<Vec<_>>().join(", "),
                     );
                     let spec = Spec::from_toml(&text, "spec.toml").unwrap();
-                    let study = design(&spec, &Options::without_proof()).unwrap().robust.unwrap();
+                    let study = study(&design(&spec, &DesignOptions::without_proof()).unwrap());
                     let found = study.robust.largest_found;
                     assert!(study.lower <= found && found <= 1.0012 * study.lower, "{text} {study:?}");
                     assert!(study.gain() >= 0.0, "{text} {study:?}");

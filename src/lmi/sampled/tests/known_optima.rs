@@ -1,6 +1,7 @@
 //! Optima known from other software, closed forms and bounds.
 
 use super::*;
+use crate::linalg::Mat;
 
 /// Optima from the theory's table of golden numbers (independent solvers, 1e-7 and better).
 #[test]
@@ -80,9 +81,9 @@ fn one_step_prediction_meets_the_nehari_bound() {
     for a in [0.0, 0.5, -0.7, 0.8] {
         let point = |omega: f64| {
             let z = Complex::from_polar(1.0, omega);
-            Point { omega, w: CMat::from_element(1, 1, z / (one - z * a)), h: CMat::identity(1, 1) }
+            FrequencyPoint { omega, w: CMat::from_element(1, 1, z / (one - z * a)), h: CMat::identity(1, 1) }
         };
-        let problem = Problem::new(testbank::grid(301).into_iter().map(point).collect(), vec![80]);
+        let problem = SampledProblem::new(testbank::grid(301).into_iter().map(point).collect(), vec![80]);
         let s = solve("Nehari", &problem);
         let want = 1.0 / (1.0 - a * a);
         assert!((s.gamma - want).abs() < 1e-8 * want, "a = {a}: {} instead of {want}", s.gamma);
@@ -142,12 +143,10 @@ fn lower_bounds_hold_for_any_taps_and_any_dual() {
     let mut r = Random(4);
     for k in 0..300 {
         let step = 10f64.powi(-(k % 8));
-        let mut taps = s.taps.clone();
-        for (j, f) in taps.iter_mut().enumerate() {
-            *f += crate::linalg::Mat::from_fn(2, 2, |p, _| {
-                if j < problem.lags()[p] { step * r.sample() } else { 0.0 }
-            });
-        }
+        let change = |(j, f): (usize, &Mat)| {
+            f + Mat::from_fn(2, 2, |p, _| if j < problem.lags()[p] { step * r.sample() } else { 0.0 })
+        };
+        let taps = s.taps.lags().iter().enumerate().map(change).collect();
         assert!(problem.worst(&taps).unwrap() >= s.lower.value);
         let near = |l: usize| problem.error_at(l, &taps) + random_matrix(&mut r, 2, 3) * Complex::from(step);
         let dual: Vec<CMat> = (0..problem.points().len()).map(near).collect();

@@ -38,7 +38,11 @@ fn noise_of_the_channels_is_like_points_of_its_own() {
         let points = (0..circle).map(|l| {
             let mut h = CMat::zeros(n, q);
             (0..n).for_each(|i| h[(i, i)] = Complex::from(faint * noise[i].sqrt()));
-            Point { omega: std::f64::consts::TAU * l as f64 / circle as f64, w: CMat::zeros(m, q), h }
+            FrequencyPoint {
+                omega: std::f64::consts::TAU * l as f64 / circle as f64,
+                w: CMat::zeros(m, q),
+                h,
+            }
         });
         let mut weights = vec![1.0; 9];
         weights.extend(vec![1.0 / (faint * faint * circle as f64); circle]);
@@ -51,7 +55,7 @@ fn noise_of_the_channels_is_like_points_of_its_own() {
         assert!((free - other).abs() < 1e-9 * free, "{noise:?}: {free} {other}");
         for slack in [1e-3, 0.05, 0.5] {
             let cap = (1.0 + slack) * s.gamma;
-            let capped = |p: &Problem, q: &MeanSquareObjective| {
+            let capped = |p: &SampledProblem, q: &MeanSquareObjective| {
                 mean_square_under_cap(p, q, cap, &s.taps, FINEST_GAP, &|| false).unwrap().unwrap()
             };
             let (a, b) = (capped(&problem, &square), capped(&longer, &alike));
