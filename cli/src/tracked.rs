@@ -83,7 +83,7 @@ pub(super) fn fuse(job: &BankRun<'_>, table: &Path, mut reader: MultiReader) -> 
 }
 
 /// Fuses tables whose samples have stamps.
-pub(super) fn fuse_stamps(job: &Job<'_>, inputs: &[PathBuf], format: &FileFormat) -> Result<(), Failure> {
+pub(super) fn fuse_stamps(job: &BankRun<'_>, inputs: &[PathBuf], format: &FileFormat) -> Result<(), Failure> {
     let scale = Converters::from(job.bank).scale(format.full_scale);
     let (mut channels, mut stamps) = (Vec::new(), Vec::new());
     for path in inputs {
@@ -111,7 +111,7 @@ pub(super) fn fuse_stamps(job: &Job<'_>, inputs: &[PathBuf], format: &FileFormat
 }
 
 /// Writes what was fused, and reports it.
-fn write(job: &Job<'_>, tracked: &Tracked, rate: f64, warnings: Vec<String>) -> Result<(), Failure> {
+fn write(job: &BankRun<'_>, tracked: &Tracked, rate: f64, warnings: Vec<String>) -> Result<(), Failure> {
     let samples = &tracked.samples;
     let mono = Mono { samples, imaginary: None, rate, format: job.format, container: job.container };
     let files = begin_recording(job.output, mono, job.args.force)?;

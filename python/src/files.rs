@@ -1,6 +1,6 @@
 //! Recordings from files, as `fuse` and `measure` of the command line read them.
 
-use crate::arrays::{Held, ArrayShape};
+use crate::arrays::{ArrayShape, Held};
 use crate::bank::Bank;
 use crate::errors::{capture_error, io_error, refused, warn};
 use crate::formats;
