@@ -108,7 +108,7 @@ impl Stream {
         let held = Held::new(&frames, shape.scaled(self.shape.scale))?;
         self.check_parts(held.format)?;
         let mut array = NewArray::new(x.py(), held.frames() * self.plan.ratio(), self.format)?;
-        let samples = held.samples(&mut *self.decoders(&held)?)?;
+        let samples = held.samples(&mut self.decoders(&held)?)?;
         let (parts, room) = (samples.parts(), array.bytes()?);
         let samples = x.py().detach(|| self.lock().push(&parts, room))?;
         array.finish_first(samples)

@@ -245,9 +245,8 @@ impl SigmfMeta {
 
 /// The text with null in place of NaN and infinity, which JSON does not have, but Python writes.
 fn without_nan(text: &str) -> String {
-    let mut parts = text.split_inclusive('"');
     let (mut is_quoted, mut kept) = (false, String::with_capacity(text.len()));
-    while let Some(part) = parts.next() {
+    for part in text.split_inclusive('"') {
         match is_quoted {
             true => kept.push_str(part),
             false => kept.push_str(

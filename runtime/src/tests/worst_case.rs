@@ -213,7 +213,7 @@ fn denormals_count_as_zero_and_the_least_normal_numbers_stay() {
     assert_eq!(run(&bank, by(Algorithm::Direct), &[narrow, 0.0, 0.0])[..2], [narrow, -2.0 * narrow]);
     assert_eq!(run(&bank, by(Algorithm::Direct), &[narrow / 2.0, 0.0, 0.0])[..2], [0.0, 0.0]);
     let options = precise(Algorithm::Direct, Precision::Double);
-    assert_eq!(run(&bank, options.clone(), &[tiny, 0.0, 0.0])[..2], [tiny, -2.0 * tiny]);
+    assert_eq!(run(&bank, options, &[tiny, 0.0, 0.0])[..2], [tiny, -2.0 * tiny]);
     assert_eq!(run(&bank, options, &[tiny / 2.0, 0.0, 0.0])[..2], [0.0, 0.0]);
     let bank = fir_bank(vec![vec![1.0; 3]], 1);
     assert_eq!(run(&bank, by(FIR_ALGORITHMS[1]), &[narrow / 2.0; 40]), [0.0; 40]);

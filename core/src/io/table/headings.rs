@@ -106,7 +106,7 @@ pub(super) fn role(heading: &str, below: &str) -> Role {
     let unit = below.iter().chain(own.iter().rev()).find_map(|word| unit_of(word));
     let is_known = |word: &&str| is(&TIMES, word) || is(&BESIDE, word) || unit_of(word).is_some();
     let is_axis = own.first().is_some_and(|word| word == "x") && unit.is_some();
-    if all.iter().all(|word| is_known(&word)) && (names || is_axis) { Role::Time(unit) } else { Role::Other }
+    if all.iter().all(is_known) && (names || is_axis) { Role::Time(unit) } else { Role::Other }
 }
 
 /// True for a line below the headings that holds units: its first cell is one, or numbers the lines.

@@ -135,7 +135,7 @@ impl<R: Read> Lines<R> {
             if self.line.contains(&0) {
                 return Err(self.fault("it is not text; this is no table of numbers"));
             }
-            self.to_utf8();
+            self.decode_as_utf8();
             if !self.line.trim_ascii().is_empty() {
                 let end = self.line.iter().rposition(|byte| !matches!(byte, b'\r' | b'\n'));
                 return Ok(Some(&self.line[..=end.unwrap_or(0)]));
@@ -157,7 +157,7 @@ impl<R: Read> Lines<R> {
     }
 
     /// A line that is not UTF-8 is Windows-1252, which has Latin-1 in it.
-    fn to_utf8(&mut self) {
+    fn decode_as_utf8(&mut self) {
         if self.number == 1 && self.line.starts_with(MARK) {
             self.line.drain(..MARK.len());
         }

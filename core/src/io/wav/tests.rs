@@ -230,9 +230,14 @@ fn fewer_bits_than_bytes_are_found_high_or_low() {
                 let data: Vec<u8> = values.iter().flat_map(word).collect();
                 std::fs::write(&path, riff(&[chunk(b"fmt ", &fmt), chunk(b"data", &data)])).unwrap();
                 let mut reader =
-                    MultiReader::start(&[path.clone()], ReadOptions::files(), &mut |_| {}).unwrap();
+                    MultiReader::start(std::slice::from_ref(&path), ReadOptions::files(), &mut |_| {})
+                        .unwrap();
                 let samples = OfflineSamples::read(&mut reader, 10).unwrap().channels;
-                assert_eq!(samples, [want.clone()], "{valid} of {bytes} bytes, shifted by {shift}");
+                assert_eq!(
+                    samples,
+                    std::slice::from_ref(&want),
+                    "{valid} of {bytes} bytes, shifted by {shift}"
+                );
                 let spans = FrameFile::open(&path).unwrap().read::<f64>(1, 9).unwrap();
                 assert_eq!(spans, want[1..], "{valid} of {bytes} bytes, shifted by {shift}");
             }
