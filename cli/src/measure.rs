@@ -52,7 +52,8 @@ pub(super) struct Args {
     reference: Option<PathBuf>,
     #[command(flatten)]
     reading: CaptureArgs,
-    /// Sample rate of a recording that states none (48kHz, 1GS/s, or hertz); of a table in place of its times
+    /// Sample rate of a recording that states none (48kHz, 1GS/s, or hertz); of a table in place of its
+    /// times
     #[arg(long, value_name = "F", value_parser = rate)]
     rate: Option<Hertz>,
     /// Samples at either end that are not measured, such as those before a filter has settled

@@ -1,4 +1,5 @@
-//! `fuse --track` and `fuse --stamps`: delays that change, from a table, and samples with stamps of their own.
+//! `fuse --track` and `fuse --stamps`: delays that change, from a table, and samples with stamps of their
+//! own.
 
 use super::capture_file::unread;
 use super::print::{Failure, check_strict, failed, failed_at, is_dash, print, print_report, warn};

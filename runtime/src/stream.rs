@@ -69,7 +69,7 @@ impl Stream {
         self.position
     }
 
-    /// FrameSource samples that were NaN or infinite and became 0, since the beginning.
+    /// Input samples that were NaN or infinite and became 0, since the beginning.
     pub fn replaced(&self) -> u64 {
         self.replaced
     }

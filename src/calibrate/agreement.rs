@@ -22,8 +22,8 @@ const LEAST_LEVEL: f64 = 1e-3;
 /// A gain this far from that of the spec, beyond what the spec allows, contradicts it. Converters that are
 /// not calibrated differ by a few per cent.
 const GAIN_ERROR: f64 = 0.05;
-/// The means of two channels, less their offsets in the spec, differ by this share of the rms where converters
-/// are not calibrated: an image of -40 dB.
+/// The means of two channels, less their offsets in the spec, differ by this share of the rms where
+/// converters are not calibrated: an image of -40 dB.
 const OFFSET_SHARE: f64 = 0.02;
 /// Samples of this size, of full scale, are no samples of a converter.
 const BEYOND_FULL_SCALE: f64 = 1e3;

@@ -96,8 +96,8 @@ impl Block {
         self.parts.iter_mut().enumerate().try_for_each(|(k, part)| append(&frames.part(k), part))
     }
 
-    /// Lets `read` put frames where their numbers are to lie, in a room of `bytes` bytes, and say how many bytes
-    /// these have. False, without a call, where samples are stored otherwise than in memory.
+    /// Lets `read` put frames where their numbers are to lie, in a room of `bytes` bytes, and say how many
+    /// bytes these have. False, without a call, where samples are stored otherwise than in memory.
     pub(super) fn read_native(
         &mut self,
         header: &StreamHeader,

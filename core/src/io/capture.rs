@@ -15,8 +15,8 @@ pub(super) trait Capture {
     /// Format, channels and rate, as stored.
     fn stream_header(&self) -> StreamHeader;
 
-    /// Appends the next frames, about `bytes` bytes of them at most, to `block`, which is one of this header;
-    /// there may be none yet. False at the end.
+    /// Appends the next frames, about `bytes` bytes of them at most, to `block`, which is one of this
+    /// header; there may be none yet. False at the end.
     fn read_block(&mut self, bytes: usize, block: &mut Block) -> Result<bool, io::Error>;
 
     /// What it says besides its samples.

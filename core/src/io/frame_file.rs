@@ -84,8 +84,8 @@ impl FrameFile {
         self.frames
     }
 
-    /// The numbers of `count` frames from `first` on, or of as many as there are, frame after frame; the parts
-    /// of complex samples take turns.
+    /// The numbers of `count` frames from `first` on, or of as many as there are, frame after frame; the
+    /// parts of complex samples take turns.
     ///
     /// # Errors
     /// [`IoError::File`].

@@ -79,9 +79,16 @@ impl InputFrames {
 
     /// What was tolerated, at the end.
     pub(super) fn faults(&mut self) -> Vec<InputFault> {
-        let bytes = self.begun.frames() * self.stored.frame_bytes();
-        let cut = (bytes > 0).then_some(InputFault::CutFrame { bytes });
-        self.capture.faults().into_iter().chain(cut).chain(self.scaling.faults()).collect()
+        let begun = self.begun.frames() * self.stored.frame_bytes();
+        let mut faults = self.capture.faults();
+        // The last turn of converters may lack samples, and the last sample bytes.
+        match faults.iter_mut().find(|fault| matches!(fault, InputFault::CutFrame { .. })) {
+            Some(InputFault::CutFrame { bytes }) => *bytes += begun,
+            _ if begun > 0 => faults.push(InputFault::CutFrame { bytes: begun }),
+            _ => {}
+        }
+        faults.extend(self.scaling.faults());
+        faults
     }
 }
 

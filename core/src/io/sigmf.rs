@@ -344,7 +344,8 @@ mod tests {
             recording.timestamps("test").unwrap(),
             Timestamps::new(vec![timestamp(0, 100), timestamp(5, 107)]).unwrap()
         );
-        // Frames before the first capture are none of it; those of a recording that was split count from its offset.
+        // Frames before the first capture are none of it; those of a recording that was split count from its
+        // offset.
         recording.global.offset = 10;
         assert_eq!(
             recording.timestamps("test").unwrap(),

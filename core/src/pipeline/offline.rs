@@ -27,8 +27,9 @@ const MULTIPLY_ADDS_PER_STORE: usize = 8;
 /// with the signal.
 ///
 /// `parts` is one input of real samples, or the real and the imaginary parts of complex ones; then
-/// [`FrameSink::select`](crate::runtime::FrameSink::select) says which of them `output` stores. `stop` is called
-/// every few milliseconds of work, on the thread of the caller, and ends the fusion if it returns true.
+/// [`FrameSink::select`](crate::runtime::FrameSink::select) says which of them `output` stores. `stop` is
+/// called every few milliseconds of work, on the thread of the caller, and ends the fusion if it returns
+/// true.
 ///
 /// # Errors
 /// [`PipelineError::Process`] if the channels do not match the bank or the output is too short, and

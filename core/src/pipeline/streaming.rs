@@ -11,7 +11,7 @@ const STEP_BYTES: usize = 256 << 10;
 /// Steps of several threads are so many times as long, enough for the chunks of all.
 const PARALLEL_STEPS: usize = 8;
 
-/// FrameSink samples with their mask.
+/// Output samples with their mask.
 #[derive(Debug, Clone, Copy)]
 pub struct Block<'a> {
     /// Encoded samples.
@@ -65,13 +65,13 @@ impl<'a> Pipeline<'a> {
         self.fusion.stream().position()
     }
 
-    /// FrameSink samples so far.
+    /// Output samples so far.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// FrameSink samples of the frames so far that wait for later frames, from which missing samples may have
-    /// to be estimated; a flush brings them out.
+    /// Output samples of the frames so far that wait for later frames, from which missing samples may
+    /// have to be estimated; a flush brings them out.
     pub fn pending(&self) -> u64 {
         self.fusion.pending() as u64
     }

@@ -1,10 +1,10 @@
 //! Samples of a call, wherever and however they lie: to and from interleaved frames of the kernels' number
 //! type.
 //!
-//! A stream takes any [`FrameSource`] and gives to any [`FrameSink`]; those here are [`Interleaved`] and [`Planar`]
-//! samples in memory, recordings as they lie in files ([`PcmFrames`](crate::PcmFrames)), several inputs
-//! [`SideBySide`], [`Zeros`], slices of samples and [`PcmOutput`](crate::PcmOutput). The kernels' blocks are converted one by one, so that no
-//! adapter needs memory of its own.
+//! A stream takes any [`FrameSource`] and gives to any [`FrameSink`]; those here are [`Interleaved`] and
+//! [`Planar`] samples in memory, recordings as they lie in files ([`PcmFrames`](crate::PcmFrames)), several
+//! inputs [`SideBySide`], [`Zeros`], slices of samples and [`PcmOutput`](crate::PcmOutput). The kernels'
+//! blocks are converted one by one, so that no adapter needs memory of its own.
 
 mod in_memory;
 mod offsets;

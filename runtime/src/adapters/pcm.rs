@@ -28,7 +28,8 @@ impl<'a> PcmOutput<'a> {
         Self { layout: SampleLayout::packed(format), bytes, clipped: 0, encoded_peak: 0.0, part: None }
     }
 
-    /// The largest magnitude, of full scale, of the first `samples` numbers, as they were before they saturated.
+    /// The largest magnitude, of full scale, of the first `samples` numbers, as they were before they
+    /// saturated.
     pub fn peak(&self, samples: usize) -> f64 {
         let size = self.layout.format.bytes();
         let written = &self.bytes[..(samples * size).min(self.bytes.len())];

@@ -1,8 +1,8 @@
 //! Denormal numbers count as 0 during a call.
 //!
 //! Processors of Intel handle denormals in microcode: a signal that fades away would run at a hundredth of
-//! the usual speed. So the mode of the thread is set for the time of a call, on every processor, and the bits
-//! agree everywhere. What a call gives depends on no mode that its caller has set.
+//! the usual speed. So the mode of the thread is set for the time of a call, on every processor, and the
+//! bits agree everywhere. What a call gives depends on no mode that its caller has set.
 
 /// Bits of MXCSR that count denormal operands as 0, and denormal results.
 #[cfg(all(target_arch = "x86_64", not(miri)))]
@@ -49,8 +49,8 @@ fn read() -> u64 {
 #[cfg(all(target_arch = "x86_64", not(miri)))]
 fn write(bits: u64) {
     let bits = bits as u32;
-    // SAFETY: the bits are those that were read, with those of the mode, which every x86-64 processor has. Only
-    // kernels and copies of samples run until they are set back.
+    // SAFETY: the bits are those that were read, with those of the mode, which every x86-64 processor has.
+    // Only kernels and copies of samples run until they are set back.
     unsafe { std::arch::asm!("ldmxcsr [{}]", in(reg) &raw const bits, options(nostack, preserves_flags)) };
 }
 

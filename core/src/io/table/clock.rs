@@ -1,4 +1,5 @@
-//! Whether the time stamps of a table are those of an even clock, and how many lines are missing between them.
+//! Whether the time stamps of a table are those of an even clock, and how many lines are missing between
+//! them.
 
 use super::stamp::Stamp;
 use crate::quantity::readable;
@@ -74,8 +75,8 @@ impl Unsteady {
     }
 }
 
-/// A line through the stamps seen so far: stamp k lies at the first one plus k times a step between `low` and
-/// `high`, up to the rounding of both stamps.
+/// A line through the stamps seen so far: stamp k lies at the first one plus k times a step between `low`
+/// and `high`, up to the rounding of both stamps.
 #[derive(Debug, Clone)]
 pub(super) struct Clock {
     first: Stamp,

@@ -63,7 +63,8 @@ impl<R: Read> Table<R> {
     /// time, and now those up to the first line of numbers.
     ///
     /// # Errors
-    /// [`IoError::Malformed`] if none is found or the options name what is not there, or the system's refusal.
+    /// [`IoError::Malformed`] if none is found or the options name what is not there, or the system's
+    /// refusal.
     pub fn new(
         inner: R,
         file: &str,

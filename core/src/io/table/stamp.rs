@@ -89,8 +89,8 @@ fn decimal(text: &str) -> Option<Stamp> {
     any.then_some(Stamp { mantissa, exponent, is_date: false })
 }
 
-/// `2026-11-28T10:00:00.125Z`, with a space for the T, with / for the -, with an offset from UTC, or the time
-/// of day alone. Seconds count from 1970, or from midnight.
+/// `2026-11-28T10:00:00.125Z`, with a space for the T, with / for the -, with an offset from UTC, or the
+/// time of day alone. Seconds count from 1970, or from midnight.
 fn date_time(text: &str) -> Option<Stamp> {
     let (date, time) = match text.find(['T', ' ', '_']) {
         Some(at) => (days(&text[..at])?, &text[at + 1..]),
