@@ -106,7 +106,10 @@ pub(super) fn role(heading: &str, below: &str) -> Role {
     let unit = below.iter().chain(own.iter().rev()).find_map(|word| unit_of(word));
     let is_known = |word: &&str| is(&TIMES, word) || is(&BESIDE, word) || unit_of(word).is_some();
     let is_axis = own.first().is_some_and(|word| word == "x") && unit.is_some();
-    if all.iter().all(is_known) && (names || is_axis) { Role::Time(unit) } else { Role::Other }
+    // A line of units says it in any language.
+    let is_in_units = below.len() == 1 && unit_of(&below[0]).is_some();
+    let is_time = is_in_units || (all.iter().all(is_known) && (names || is_axis));
+    if is_time { Role::Time(unit) } else { Role::Other }
 }
 
 /// True for a line below the headings that holds units: its first cell is one, or numbers the lines.
@@ -194,7 +197,8 @@ mod tests {
             ("Time [us]", "", Role::Time(Some(1e-6))),
             ("TIME", "", Role::Time(None)),
             ("Time", "(ms)", Role::Time(Some(1e-3))),
-            ("Zeit", "(ms)", Role::Other),
+            ("Zeit", "(ms)", Role::Time(Some(1e-3))),
+            ("Source", "Second", Role::Time(Some(1.0))),
             ("x-axis", "second", Role::Time(Some(1.0))),
             ("X", "Second", Role::Time(Some(1.0))),
             ("X", "Sequence", Role::Index),
