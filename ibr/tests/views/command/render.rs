@@ -1,4 +1,4 @@
-//! Renderings of each kind of scene, and the demo.
+//! Renderings of each kind of scene.
 
 use super::*;
 use hybank_ibr::image::{Image, MOST_PIXELS, read_image};
@@ -310,7 +310,11 @@ fn images_and_tracks_alone_are_enough() {
     assert!(between["coverage"].as_f64().unwrap() > 0.5, "{between}");
     let refused = run(dir.path(), &["render", "s.toml", "-o", "q.png", "--degree", "linear"]);
     assert_eq!(code(&refused), 2);
-    assert!(stderr(&refused).contains("--degree: it is for a scene with cameras"), "{}", stderr(&refused));
+    assert!(
+        stderr(&refused).contains("--degree: it is for a scene of general cameras"),
+        "{}",
+        stderr(&refused)
+    );
     // Seven tracks are too few, and tracks of a plane do not determine the geometry.
     let few = "1 2 3 4 -\n".repeat(7);
     std::fs::write(dir.path().join("tracks.txt"), few).unwrap();
@@ -368,33 +372,6 @@ fn odd_images_are_fine() {
     }
 }
 
-/// A grey photograph beside a coloured one: the note says what each gives, and the view has 34.0 dB (43.9
-/// from two coloured ones). With three equal channels it counts as coloured, its grey is mixed in, and the
-/// view has 27.2 dB.
-#[test]
-fn a_grey_photograph_takes_the_colours_of_the_other() {
-    let dir = rig();
-    let photograph = read_image(&dir.path().join("right.png"), MOST_PIXELS).unwrap();
-    let luminance = |pixel: &[f32]| 0.299 * pixel[0] + 0.587 * pixel[1] + 0.114 * pixel[2];
-    let rendered = || {
-        let arguments = ["render", "scene.toml", "-o", "o.png", "--force", "--truth", "middle.png", "--json"];
-        let done = run(dir.path(), &arguments);
-        (json(&done)["psnr"].as_f64().unwrap(), stderr(&done))
-    };
-    let with = |channels: usize| {
-        let values = photograph.data().chunks(3).flat_map(|pixel| vec![luminance(pixel); channels]);
-        let grey = Image::new(SIZE.0, SIZE.1, channels, values.collect()).unwrap();
-        save(&grey, &dir.path().join("right.png")).unwrap();
-        rendered()
-    };
-    let (coloured, of_coloured) = rendered();
-    let ((grey, said), (mixed, _)) = (with(1), with(3));
-    println!("two coloured {coloured:.2} dB, one grey {grey:.2} dB, its grey as colour {mixed:.2} dB");
-    let note = "view 2 is grey beside coloured ones: what the others show gives the colour, the grey photographs the luminance";
-    assert!(said.contains(note) && !of_coloured.contains("grey"), "{said}{of_coloured}");
-    assert!(coloured > 43.0 && grey > 33.5 && grey > mixed + 5.0, "{coloured} {grey} {mixed}");
-}
-
 /// A COLMAP model whose lenses bend: the photograph of the view that is left out is met through its own
 /// lens.
 #[test]
@@ -430,18 +407,4 @@ fn colmap_lenses_are_used() {
     write_cameras("0 0 0 0");
     let wrong = psnr();
     assert!(right > 31.0 && right > wrong + 3.0, "with the lens {right} dB, without {wrong} dB");
-}
-
-#[test]
-fn the_demo_needs_no_data() {
-    let dir = tempfile::tempdir().unwrap();
-    let figures = json(&run(dir.path(), &["demo", "-o", "sheet.png", "--size", "160x120", "--json"]));
-    let psnr = |kind: &str| figures[kind]["psnr"].as_f64().unwrap();
-    assert!(psnr("full_depth") > 34.0 && psnr("partial_depth") > 27.0, "{figures}");
-    assert_eq!(
-        read_image(&dir.path().join("sheet.png"), MOST_PIXELS).unwrap().size(),
-        (3 * 166 + 6, 2 * 126 + 6)
-    );
-    let again = run(dir.path(), &["demo", "-o", "sheet.png"]);
-    assert_eq!(code(&again), 1);
 }
