@@ -1,5 +1,5 @@
-//! Writes the folder of a synthetic scene: seven views of general cameras with exact depth, and scene.toml with
-//! the place of one more as the virtual view, whose photograph is truth.png.
+//! Writes the folder of a synthetic scene: seven views of general cameras with exact depth, and scene.toml
+//! with the place of one more as the virtual view, whose photograph is truth.png.
 //!
 //! ```sh
 //! cargo run --release -p hybank-ibr --example demo -- folder

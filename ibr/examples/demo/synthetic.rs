@@ -173,6 +173,7 @@ fn map(size: (usize, usize), values: Vec<f32>, measure: Measure) -> DepthMap {
 
 #[cfg(test)]
 mod tests {
+    #[allow(unused_imports, reason = "benches, which have no tests, see this too")]
     use super::*;
 
     #[test]

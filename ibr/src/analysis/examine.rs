@@ -1,5 +1,5 @@
-//! What the error of a rendered view comes from, cause by cause: the sizes are taken from the view, its depths
-//! and its sample counts.
+//! What the error of a rendered view comes from, cause by cause: the sizes are taken from the view, its
+//! depths and its sample counts.
 
 use super::estimate::{Examined, Predicted, Study};
 use super::jitter::depth_jitter;

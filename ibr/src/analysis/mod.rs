@@ -7,9 +7,10 @@
 //!
 //! Both are sums over causes. The size of each cause is computed: the bends of the view, which the fit
 //! smooths; the views that share in a pixel; the slope; the change under errors of depth as large as the
-//! maps' disagreement; depth edges nearby; holes, by the variogram of the photographs. The weights of the causes are calibrated on the inputs themselves:
-//! each view is left out in turn and rendered from the others, and its photograph is the truth. A single
-//! view cannot be left out; it takes the weights of typical photographs.
+//! maps' disagreement; depth edges nearby; holes, by the variogram of the photographs. The weights of the
+//! causes are calibrated on the inputs themselves: each view is left out in turn and rendered from the
+//! others, and its photograph is the truth. A single view cannot be left out; it takes the weights of
+//! typical photographs.
 //!
 //! ```
 //! use hybank_ibr::analysis::Predictor;

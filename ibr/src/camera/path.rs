@@ -28,8 +28,8 @@ impl Parts {
 }
 
 impl Camera {
-    /// The camera whose pose is the inverse of this one's: that of a matrix which maps to the world; `None` if it
-    /// is singular.
+    /// The camera whose pose is the inverse of this one's: that of a matrix which maps to the world; `None`
+    /// if it is singular.
     pub(crate) fn inverted(&self) -> Option<Self> {
         let Parts { k, rotation, centre } = Parts::of(self);
         let m = k * rotation.inverse().to_rotation_matrix().matrix();

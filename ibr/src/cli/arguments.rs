@@ -123,9 +123,9 @@ pub(super) struct RenderArguments {
     /// depth lie, black for disocclusions.
     #[arg(long, value_name = "FILE")]
     pub(super) mask: Option<PathBuf>,
-    /// Also write the depth of the virtual view (.pfm), NaN in holes: disparities in pixels for a baseline of
-    /// one of rectified rigs, depths in the unit of general cameras, and an order without a unit of scenes
-    /// without cameras.
+    /// Also write the depth of the virtual view (.pfm), NaN in holes: disparities in pixels for a baseline
+    /// of one of rectified rigs, depths in the unit of general cameras, and an order without a unit of
+    /// scenes without cameras.
     #[arg(long, value_name = "FILE")]
     pub(super) depth: Option<PathBuf>,
     /// Write a PNG with an alpha channel: transparent where no view shows what is there.

@@ -269,8 +269,8 @@ impl DepthMap {
         Ok(self.with_values(size, data))
     }
 
-    /// Whether the known values lie apart, as points of a lidar do: few of the pixels have one, and fewer than
-    /// half of these have neighbours to the right and below, where the map goes on.
+    /// Whether the known values lie apart, as points of a lidar do: few of the pixels have one, and fewer
+    /// than half of these have neighbours to the right and below, where the map goes on.
     pub(crate) fn is_scattered(&self) -> bool {
         let is_known = |p: usize| self.data.get(p).is_none_or(|v| !v.is_nan());
         let is_joined = |p: &usize| {

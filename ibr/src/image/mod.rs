@@ -126,7 +126,8 @@ impl Image {
         along(here) * (1.0 - b) + along(here + below) * b
     }
 
-    /// A channel at a position, by cubic interpolation between pixels and linear beside the border; NaN outside.
+    /// A channel at a position, by cubic interpolation between pixels and linear beside the border; NaN
+    /// outside.
     #[inline]
     pub(crate) fn cubic_at(&self, x: f64, y: f64, channel: usize) -> f32 {
         if !(x >= 1.0 && y >= 1.0 && x < self.width as f64 - 2.0 && y < self.height as f64 - 2.0) {
@@ -192,7 +193,8 @@ impl Image {
     }
 }
 
-/// Weights of the four pixels around a place, 0 to 1 beyond the second: cubic interpolation of Catmull and Rom.
+/// Weights of the four pixels around a place, 0 to 1 beyond the second: cubic interpolation of Catmull and
+/// Rom.
 pub(crate) fn cubic_weights(t: f32) -> [f32; 4] {
     [
         t * (t * (2.0 - t) - 1.0) / 2.0,

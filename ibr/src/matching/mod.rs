@@ -111,8 +111,8 @@ fn matched<P: Viewpoint>(sweeps: &[Sweep<P>]) -> Result<Vec<Vec<f32>>, MatchErro
     confirmed.collect()
 }
 
-/// The indices of the [`OTHERS`] smallest distances, and of fewer if there are fewer. Photographs from nearly one
-/// place do not show depth, so a distance that is far below the usual one does not count.
+/// The indices of the [`OTHERS`] smallest distances, and of fewer if there are fewer. Photographs from
+/// nearly one place do not show depth, so a distance that is far below the usual one does not count.
 fn nearest(distances: &[f64]) -> Vec<usize> {
     let mut sorted: Vec<f64> = distances.iter().copied().filter(|distance| *distance > 0.0).collect();
     sorted.sort_by(f64::total_cmp);

@@ -7,11 +7,12 @@ use super::view_weights::weight_of;
 use crate::camera::Camera;
 use crate::sample::Sample;
 
-/// Weight of the views beyond those that share, against the nearest: where these see nothing it counts alone.
+/// Weight of the views beyond those that share, against the nearest: where these see nothing it counts
+/// alone.
 const REST: f64 = 1e-3;
 
-/// What the weight of the best sample about is raised to where only the rest shows a place: enough for the fit,
-/// and for what is continued into holes.
+/// What the weight of the best sample about is raised to where only the rest shows a place: enough for the
+/// fit, and for what is continued into holes.
 const LEAST: f32 = 0.5;
 
 /// Shares of the views around a virtual camera.
@@ -45,8 +46,8 @@ impl Shares<'_> {
         }
     }
 
-    /// Multiplies weights and colours of the visible samples of some rows by the shares and the gains of their
-    /// views.
+    /// Multiplies weights and colours of the visible samples of some rows by the shares and the gains of
+    /// their views.
     pub(super) fn apply<const C: usize>(&self, samples: &mut [Sample<C>], mut shares: Vec<f32>) {
         self.raise(samples, &mut shares);
         for (s, share) in samples.iter_mut().zip(shares) {
@@ -56,8 +57,8 @@ impl Shares<'_> {
         }
     }
 
-    /// Raises the weights where all are low. A place is a pixel of its row with those beside it, so that bands
-    /// of rows do not change it.
+    /// Raises the weights where all are low. A place is a pixel of its row with those beside it, so that
+    /// bands of rows do not change it.
     fn raise<const C: usize>(&self, samples: &[Sample<C>], factors: &mut [f32]) {
         let row = |s: &Sample<C>| s.y.max(0.0) as usize;
         let column = |s: &Sample<C>| (s.x.max(0.0) as usize).min(self.width - 1);

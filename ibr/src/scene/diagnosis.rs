@@ -1,4 +1,5 @@
-//! Why views contradict each other: usual mistakes are tried, and the one that makes the views agree is named.
+//! Why views contradict each other: usual mistakes are tried, and the one that makes the views agree is
+//! named.
 
 use super::SourceView;
 use crate::camera::Camera;

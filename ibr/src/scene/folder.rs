@@ -10,6 +10,9 @@ use crate::image::image_size;
 use hybank_core::messages::Quoted;
 use std::path::{Path, PathBuf};
 
+/// Files of cameras that make a folder a scene.
+const LISTS: [&str; 2] = ["transforms.json", "transforms_train.json"];
+
 /// Endings of photographs.
 const PHOTOGRAPHS: [&str; 7] = ["png", "jpg", "jpeg", "ppm", "pgm", "tif", "tiff"];
 
@@ -87,9 +90,9 @@ struct Placed<'a> {
 
 impl Writer<'_> {
     fn of_folder(&self, folder: &Path) -> Found<Described> {
-        let transforms = folder.join("transforms.json");
-        if transforms.is_file() {
-            return self.of_transforms(&transforms);
+        let lists = LISTS.map(|name| folder.join(name));
+        if let Some(transforms) = lists.iter().find(|list| list.is_file()) {
+            return self.of_transforms(transforms);
         }
         let places = std::iter::once(folder.to_owned()).chain(PLACES.iter().map(|place| folder.join(place)));
         let models: Vec<PathBuf> = places.filter(|place| is_model(place)).collect();

@@ -18,9 +18,9 @@ pub struct Preparation {
     pub misregistration: Option<f64>,
 }
 
-/// Makes the maps of views dense, restores them ([`restore`]), and corrects small errors of the cameras unless
-/// they are to be kept. Unknown values of maps most of whose
-/// values are known become what `unknown` says.
+/// Makes the maps of views dense, restores them ([`restore`]), and corrects small errors of the cameras
+/// unless they are to be kept. Unknown values of maps most of whose values are known become what `unknown`
+/// says.
 ///
 /// ```
 /// use hybank_ibr::depth::{DepthMap, Measure};

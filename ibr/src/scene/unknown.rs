@@ -54,8 +54,9 @@ fn unknown_pixels(map: &DepthMap) -> Vec<usize> {
     (0..map.data().len()).filter(|p| map.data()[*p].is_nan()).collect()
 }
 
-/// The unknown pixels of a view that lie in a sky: regions at the upper border, whose directions other views do
-/// not know either. What is unknown because other cameras did not see it, they see at other places.
+/// The unknown pixels of a view that lie in a sky: regions at the upper border, whose directions other
+/// views do not know either. What is unknown because other cameras did not see it, they see at other
+/// places.
 fn sky<P: Viewpoint>(views: &[View<'_, P>], index: usize) -> Vec<usize> {
     let map = views[index].map;
     if map.measure() != Measure::Depth || map.is_scattered() {
@@ -117,8 +118,8 @@ mod tests {
 
     const SIZE: (usize, usize) = (40, 30);
 
-    /// Two cameras side by side, ten units apart; the ground is known below row 12, and what hides from one of
-    /// them is unknown at the left border.
+    /// Two cameras side by side, ten units apart; the ground is known below row 12, and what hides from one
+    /// of them is unknown at the left border.
     fn views(unknown: impl Fn(usize, usize) -> bool) -> [SourceView<Camera>; 2] {
         [0.0, 10.0].map(|x| {
             let matrix = Matrix3x4::new(30.0, 0.0, 20.0, -30.0 * x, 0.0, 30.0, 15.0, 0.0, 0.0, 0.0, 1.0, 0.0);

@@ -20,8 +20,8 @@ pub(crate) struct Projected {
     tiles: Vec<ProjectedTile>,
 }
 
-/// Share of a view below which its samples hide nothing: outlines that oblique views show tear holes into what
-/// near ones show.
+/// Share of a view below which its samples hide nothing: outlines that oblique views show tear holes into
+/// what near ones show.
 const LEAST_SHARE: f32 = 0.02;
 
 #[derive(Debug, Clone, Copy)]

@@ -254,8 +254,8 @@ impl Loader<'_> {
     }
 }
 
-/// The distance of the point that is nearest to the axes of all cameras, along that of one; that of the camera
-/// farthest away from it where the axes do not meet before it.
+/// The distance of the point that is nearest to the axes of all cameras, along that of one; that of the
+/// camera farthest away from it where the axes do not meet before it.
 fn looked_at(placed: &[Placed], camera: &Camera) -> f64 {
     let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for Placed { camera, .. } in placed {

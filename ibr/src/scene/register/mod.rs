@@ -1,5 +1,5 @@
-//! Misregistration: photographs that do not fit each other because their cameras, or the rows of a rig, are a
-//! little off. It is found from what the photographs show of common points, and taken out.
+//! Misregistration: photographs that do not fit each other because their cameras, or the rows of a rig, are
+//! a little off. It is found from what the photographs show of common points, and taken out.
 
 mod poses;
 mod rows;
@@ -13,7 +13,8 @@ use crate::propagate::Viewpoint;
 /// Displacement in pixels below which nothing is corrected: the fit does not notice it.
 const LEAST: f64 = 0.05;
 
-/// What the median difference of the photographs must fall to: else something else than the cameras is wrong.
+/// What the median difference of the photographs must fall to: else something else than the cameras is
+/// wrong.
 const BETTER: f64 = 0.98;
 
 /// Points of a photograph that are compared with another one, about.
@@ -61,8 +62,8 @@ struct Sighting<const N: usize> {
     slopes: [f64; N],
 }
 
-/// What one view shows of points of another, if that is enough to tell where it looks: of the points that fall
-/// into it at least half must have the depth and the colour that it has there.
+/// What one view shows of points of another, if that is enough to tell where it looks: of the points that
+/// fall into it at least half must have the depth and the colour that it has there.
 struct Shown<const N: usize> {
     sightings: Vec<Sighting<N>>,
     /// Points that fall into the view.

@@ -1,9 +1,9 @@
 //! Small corrections of general cameras by photometric least squares over all views.
 //!
 //! Camera i takes the motion X + w_i x (X - C_i) + t_i before it projects. A point that view i shows by its
-//! depth then moves in view j by J_j (w_j x (X - C_j) + t_j - w_i x (X - C_i) - t_i), with J_j the derivative of
-//! the projection. The brightness that view j shows there must be that of view i. The corrections are the least
-//! ones: what moves all cameras alike does not show.
+//! depth then moves in view j by J_j (w_j x (X - C_j) + t_j - w_i x (X - C_i) - t_i), with J_j the
+//! derivative of the projection. The brightness that view j shows there must be that of view i. The
+//! corrections are the least ones: what moves all cameras alike does not show.
 
 use super::{BETTER, LEAST, Shown, Sighting, middle, slope, step_of, weighed};
 use crate::camera::Camera;
@@ -28,8 +28,8 @@ const DAMPING: f64 = 1e-3;
 
 type Pair = [usize; 2];
 
-/// The cameras that the photographs fit better, and the displacement in pixels that they take out; `None` where
-/// there is nothing to correct.
+/// The cameras that the photographs fit better, and the displacement in pixels that they take out; `None`
+/// where there is nothing to correct.
 pub(super) fn refined(views: &[SourceView<Camera>]) -> Option<(Vec<Camera>, f64)> {
     let greys: Vec<Image> = views.par_iter().map(|view| view.image.to_grey()).collect();
     let pairs = pairs(views);
@@ -59,8 +59,8 @@ fn pairs(views: &[SourceView<Camera>]) -> Vec<Pair> {
     (0..views.len()).flat_map(of).collect()
 }
 
-/// What one view shows of points of another, with the derivatives by the motions of both; `None` if it is too
-/// little.
+/// What one view shows of points of another, with the derivatives by the motions of both; `None` if it is
+/// too little.
 fn sightings(
     views: &[SourceView<Camera>],
     greys: &[Image],
@@ -72,7 +72,7 @@ fn sightings(
     let map = cameras[from].relative_to(&cameras[to]);
     let sighting = |(x, y): (usize, usize)| {
         let (p, depth) = (y * width + x, view.map.row(y)[x]);
-        if view.map.is_guessed(p) || !(depth < FAR) {
+        if view.map.is_guessed(p) || depth.is_nan() || depth >= FAR {
             return None;
         }
         let (u, v, there) = map.map(x as f64, y as f64, f64::from(depth));

@@ -1,6 +1,7 @@
 //! Rows of a rectified rig that are not at one height.
 
 use super::{BETTER, LEAST, Shown, Sighting, middle, slope, step_of, weighed};
+use crate::depth::Origin;
 use crate::image::{Image, cubic_weights};
 use crate::pipeline::same_depth;
 use crate::propagate::{Viewpoint, nearest};
@@ -11,7 +12,7 @@ const ROUNDS: usize = 8;
 /// Farthest that rows are shifted.
 const FARTHEST: f64 = 8.0;
 
-/// Shifts the rows of the views to those of the first one; the root mean square shift.
+/// Shifts the rows of the views to the height that most have; the root mean square shift.
 pub(super) fn level(views: &mut [SourceView<f64>]) -> Option<f64> {
     let greys: Vec<Image> = views.iter().map(|view| view.image.to_grey()).collect();
     let mut shifts = vec![0.0; views.len()];
@@ -20,18 +21,26 @@ pub(super) fn level(views: &mut [SourceView<f64>]) -> Option<f64> {
         let Some(other) = nearest(&shown, view, 0..view) else { continue };
         shifts[view] = shifts[other] + between(views, &greys, [other, view]).unwrap_or(0.0);
     }
-    let moved = (shifts.iter().map(|s| s * s).sum::<f64>() / shifts.len().max(1) as f64).sqrt();
+    let height = usual(&shifts)?;
+    shifts.iter_mut().for_each(|shift| *shift -= height);
+    let moved = (shifts.iter().map(|s| s * s).sum::<f64>() / shifts.len() as f64).sqrt();
     if moved < LEAST {
         return None;
     }
-    // Shared evenly, so that the virtual view stays where it is.
-    let mean = shifts.iter().sum::<f64>() / shifts.len() as f64;
-    views.iter_mut().zip(shifts).for_each(|(view, shift)| shifted(view, shift - mean));
+    let beside = views.iter_mut().zip(shifts).filter(|(_, shift)| *shift != 0.0);
+    beside.for_each(|(view, shift)| shifted(view, shift));
     Some(moved)
 }
 
-/// By how many rows the second view shows points lower than the first; `None` where the photographs fit as they
-/// are.
+/// The shift that is nearest to all others; of two that of the first view, which has the exposure of all
+/// too.
+fn usual(shifts: &[f64]) -> Option<f64> {
+    let away = |shift: &&f64| shifts.iter().map(|other| (other - *shift).abs()).sum::<f64>();
+    shifts.iter().min_by(|a, b| away(a).total_cmp(&away(b))).copied()
+}
+
+/// By how many rows the second view shows points lower than the first; `None` where the photographs fit as
+/// they are.
 fn between(views: &[SourceView<f64>], greys: &[Image], pair: [usize; 2]) -> Option<f64> {
     let mut shift = 0.0;
     let before = middle(&weighed(&sightings(views, greys, pair, shift)?).0);
@@ -85,7 +94,9 @@ fn shifted(view: &mut SourceView<f64>, shift: f64) {
         map.extend_from_slice(view.map.row(clamped(from.round())));
     }
     view.image = image;
-    view.map = view.map.with_values((width, height), map);
+    // What was filled in stays so; a row more or less does not matter.
+    let map = view.map.with_values((width, height), map);
+    view.map = map.with_origins(&view.map, &[], Origin::Known);
 }
 
 #[cfg(test)]
@@ -109,12 +120,19 @@ mod tests {
     }
 
     #[test]
+    fn the_height_of_most_views_counts() {
+        assert_eq!((usual(&[0.0, 1.0]), usual(&[0.0, 1.0, 1.0])), (Some(0.0), Some(1.0)));
+    }
+
+    #[test]
     fn rows_of_another_height_are_found() {
         for rows in [1.0, -0.4] {
             let mut wrong = views(rows);
             let moved = level(&mut wrong).expect("a shift");
             assert!((moved - f64::abs(rows) / f64::sqrt(2.0)).abs() < 0.05, "{rows}: {moved}");
             assert_eq!(level(&mut wrong), None);
+            // The first view stays.
+            assert!(wrong[0] == views(rows)[0]);
         }
         assert_eq!(level(&mut views(0.0)), None);
     }
