@@ -5,8 +5,8 @@ use super::failure::{Failure, PROGRAM, failed, usage};
 use super::inputs;
 use crate::files;
 use crate::image::{Image, read_image};
-use crate::pipeline::{RenderSettings, Watch};
-use crate::scene::{self, Kind, LoadOptions, Scene, SceneSpec};
+use crate::pipeline::RenderSettings;
+use crate::scene::{self, Kind, LoadOptions, Scene, SceneSpec, Unknown};
 use hybank_core::messages::Quoted;
 use hybank_program::is_dash;
 use std::path::{Path, PathBuf};
@@ -45,15 +45,26 @@ impl SceneArguments {
         Ok(Source { path, spec })
     }
 
-    /// Loads the scene, and prints what was decided on the way.
-    pub(super) fn load(&self, source: &Source, fill: bool, watch: Watch<'_>) -> Result<Scene, Failure> {
-        let options = LoadOptions {
+    /// How the scene is read.
+    pub(super) fn options(&self) -> LoadOptions {
+        LoadOptions {
             view: self.view.clone(),
             depth_step: self.depth_step,
-            fill,
+            keep_cameras: self.keep_cameras,
             max_pixels: self.max_pixels,
-        };
-        let scene = scene::load(&source.spec, &source.path, &options, watch).map_err(failed)?;
+            ..LoadOptions::default()
+        }
+    }
+
+    /// Loads the scene, and prints what was decided on the way.
+    pub(super) fn load(
+        &self,
+        source: &Source,
+        unknown: Option<Unknown>,
+        nearest: Option<usize>,
+    ) -> Result<Scene, Failure> {
+        let options = LoadOptions { unknown, nearest, ..self.options() };
+        let scene = scene::load(&source.spec, &source.path, &options).map_err(failed)?;
         inputs::notes(&scene);
         Ok(scene)
     }
@@ -78,6 +89,16 @@ impl Source {
     /// The virtual views that the scene has.
     pub(super) fn frames(&self, arguments: &SceneArguments) -> usize {
         if arguments.view.is_some() { 1 } else { self.spec.frames().clamp(1, scene::MOST_FRAMES) }
+    }
+
+    /// The scene file.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// A file that the scene names.
+    pub(super) fn file(&self, path: &Path) -> PathBuf {
+        self.path.parent().unwrap_or(Path::new("")).join(path)
     }
 
     /// The scene file, and every file that it names.

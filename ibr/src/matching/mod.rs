@@ -41,6 +41,9 @@ pub enum MatchError {
 /// Other photographs with which each one is matched: the nearest.
 const OTHERS: usize = 2;
 
+/// Least distance of two photographs that are matched, as a share of the median distance.
+const LEAST_BASELINE: f64 = 0.02;
+
 /// The part of their sides that the photographs have when the range is looked for.
 const REDUCTION: usize = 4;
 
@@ -108,22 +111,24 @@ fn matched<P: Viewpoint>(sweeps: &[Sweep<P>]) -> Result<Vec<Vec<f32>>, MatchErro
     confirmed.collect()
 }
 
-/// The indices of the [`OTHERS`] smallest distances above 0, and of fewer if there are fewer. There may be
-/// thousands of photographs, so no more is kept.
-fn nearest(distances: impl Iterator<Item = f64>) -> Vec<usize> {
-    let mut found: Vec<(f64, usize)> = Vec::with_capacity(OTHERS + 1);
-    for (index, distance) in distances.enumerate().filter(|(_, distance)| *distance > 0.0) {
-        found.insert(found.partition_point(|(nearer, _)| *nearer <= distance), (distance, index));
-        found.truncate(OTHERS);
-    }
-    found.into_iter().map(|(_, index)| index).collect()
+/// The indices of the [`OTHERS`] smallest distances, and of fewer if there are fewer. Photographs from
+/// nearly one place do not show depth, so a distance that is far below the usual one does not count.
+fn nearest(distances: &[f64]) -> Vec<usize> {
+    let mut sorted: Vec<f64> = distances.iter().copied().filter(|distance| *distance > 0.0).collect();
+    sorted.sort_by(f64::total_cmp);
+    let least = sorted.get(sorted.len().saturating_sub(1) / 2).map_or(0.0, |middle| LEAST_BASELINE * middle);
+    let mut found: Vec<usize> = (0..distances.len()).filter(|k| distances[*k] > least).collect();
+    found.sort_by(|a, b| distances[*a].total_cmp(&distances[*b]));
+    found.truncate(OTHERS);
+    found
 }
 
 impl<P: Viewpoint> Sweep<P> {
     /// Finds the nearest other photographs, and takes the widest range.
     fn prepare(sweeps: &mut [Self], index: usize) -> Result<(), MatchError> {
         let sweep = &sweeps[index];
-        let others = nearest(sweeps.iter().map(|other| sweep.camera.distance(&other.camera)));
+        let distances: Vec<f64> = sweeps.iter().map(|other| sweep.camera.distance(&other.camera)).collect();
+        let others = nearest(&distances);
         let shift = others.iter().map(|k| sweep.shift(&sweeps[*k].camera)).fold(0.0, f64::max);
         let pixels = |share: f64| (share * sweep.grey.width() as f64) as i32;
         let (low, widest) = match sweep.measure {

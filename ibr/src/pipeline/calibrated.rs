@@ -1,8 +1,10 @@
 //! A view from any number of calibrated cameras with depth.
 
+use super::depth_errors::median;
+use super::nearness::{Nearness, Placed, choose};
+use super::shares::Shares;
 use super::{
-    Agreement, Method, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch, check_counts,
-    check_size,
+    Agreement, RenderError, RenderSettings, Rendering, Report, ViewWeights, check_counts, check_size,
 };
 use crate::camera::Camera;
 use crate::depth::Measure;
@@ -14,8 +16,8 @@ use crate::sample::Sample;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Share of the first two stages in the work, about.
-const GATHERING: f64 = 0.7;
+/// Shares of the depths of a map that are nearer than those for which views are chosen.
+pub(crate) const QUARTILES: [f64; 2] = [0.25, 0.75];
 /// Samples held in memory at a time; larger scenes are rendered in bands of rows.
 const SAMPLES_AT_A_TIME: usize = 1 << 16;
 /// Fewest rows of a band, however many samples they have: neighbouring bands share some rows, whose samples
@@ -32,35 +34,26 @@ pub fn render(
     size: (usize, usize),
     settings: &RenderSettings,
 ) -> Result<Rendering, RenderError> {
-    render_watched(views, camera, size, settings, &|_| ())
-}
-
-/// As [`render`]; `watch` is called with the share of the work that is done.
-///
-/// # Errors
-/// As [`render`].
-pub fn render_watched(
-    views: &[CalibratedView<'_>],
-    camera: &Camera,
-    size: (usize, usize),
-    settings: &RenderSettings,
-    watch: Watch<'_>,
-) -> Result<Rendering, RenderError> {
     check(views, size, settings)?;
     let colour = views.iter().any(|v| v.image.channels() == 3);
     match (settings.interpolation.plane.degree, colour) {
-        (Degree::Linear, false) => render_with::<2, 1>(views, camera, size, settings, watch),
-        (Degree::Linear, true) => render_with::<2, 3>(views, camera, size, settings, watch),
-        (Degree::Cubic, false) => render_with::<4, 1>(views, camera, size, settings, watch),
-        (Degree::Cubic, true) => render_with::<4, 3>(views, camera, size, settings, watch),
+        (Degree::Linear, false) => render_with::<2, 1>(views, camera, size, settings),
+        (Degree::Linear, true) => render_with::<2, 3>(views, camera, size, settings),
+        (Degree::Cubic, false) => render_with::<4, 1>(views, camera, size, settings),
+        (Degree::Cubic, true) => render_with::<4, 3>(views, camera, size, settings),
     }
 }
 
-fn view_weights(views: &[CalibratedView<'_>], camera: &Camera, settings: &RenderSettings) -> ViewWeights {
-    match settings.nearest {
-        Some(_) => ViewWeights::by_angle(views, camera).nearest(settings.nearest),
-        None => ViewWeights::of(views, camera),
-    }
+/// The views that a virtual view is made of, by number.
+fn chosen(views: &[CalibratedView<'_>], target: &Placed, settings: &RenderSettings) -> Vec<usize> {
+    let placed = |view: &CalibratedView<'_>| Placed { camera: view.camera, size: view.image.size() };
+    let depths = |share: f64| {
+        let mut depths: Vec<f64> =
+            views.iter().filter_map(|view| view.map.quantile(share)).map(f64::from).collect();
+        median(&mut depths)
+    };
+    let depths: Vec<f64> = QUARTILES.into_iter().filter_map(depths).collect();
+    choose(&views.iter().map(placed).collect::<Vec<_>>(), target, &depths, settings.nearest)
 }
 
 fn check(
@@ -71,9 +64,6 @@ fn check(
     let largest = views.iter().map(|v| v.image.width() * v.image.height()).max().unwrap_or(0);
     check_counts(views.len(), largest.max(size.0.saturating_mul(size.1)))?;
     settings.check()?;
-    if settings.method == Method::Rows {
-        return Err(RenderError::RowsOfGeneralCameras);
-    }
     let mut all = views.iter().enumerate();
     all.try_for_each(|(view, v)| check_size(view, "the depth map", v.map.size(), v.image.size()))
 }
@@ -88,27 +78,26 @@ fn render_with<const ORDER: usize, const C: usize>(
     camera: &Camera,
     (width, height): (usize, usize),
     settings: &RenderSettings,
-    watch: Watch<'_>,
 ) -> Result<Rendering, RenderError> {
-    let view_weights = view_weights(views, camera, settings);
+    let chosen = chosen(views, &Placed { camera: *camera, size: (width, height) }, settings);
     let agreement = Agreement::of(views);
-    let view_weights = view_weights.with_noise(&agreement);
+    let view_weights = ViewWeights::of(views, camera).only(&chosen).with_noise(&agreement);
     let settings = &settings.suited_to(&agreement, &view_weights, Measure::Depth);
-    let chosen = view_weights.views();
     let pixels: usize = chosen.iter().map(|v| views[*v].image.width() * views[*v].image.height()).sum();
     let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &settings.interpolation);
     let footprint = Footprint::of(views, &chosen, camera, &Frame::whole(width, height, 0.5, settings.offset));
     let view_weights =
         if settings.keep_exposure { view_weights } else { view_weights.with_gains(&agreement.gains) };
+    let nearness = Nearness::new(views.iter().map(|view| view.camera), camera);
+    let (offset, sharing) = (settings.offset, Shares::sharing(settings.nearest));
+    let shares = Shares { nearness, camera, offset, width, sharing, view_weights: &view_weights };
     let count = bands_of(footprint.most_samples(), height);
     let bands: Vec<Range<usize>> =
         (0..count).map(|band| band * height / count..(band + 1) * height / count).collect();
-    let (ready, propagated) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let propagated = AtomicUsize::new(0);
     problem.add_bands(&bands, |rows| {
-        let (mut samples, all) = visible_in(rows, height, &footprint, views, settings.depth_test());
-        view_weights.apply(&mut samples);
+        let (samples, all) = visible_in(rows, height, &footprint, views, settings.depth_test(), &shares);
         propagated.fetch_add(all, Ordering::Relaxed);
-        watch(GATHERING * (ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64);
         samples
     });
     let propagated = propagated.into_inner();
@@ -118,7 +107,7 @@ fn render_with<const ORDER: usize, const C: usize>(
         return Err(RenderError::NoOverlap { pixels, dropped });
     }
     let report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
-    let fit = problem.stiffened_by_area().solve(&|share| watch(GATHERING + (1.0 - GATHERING) * share));
+    let fit = problem.stiffened_by_area().solve();
     Ok(Rendering::of_plane::<C>(fit, report, chosen, agreement))
 }
 
@@ -131,14 +120,18 @@ fn visible_in<const C: usize>(
     footprint: &Footprint,
     views: &[CalibratedView<'_>],
     test: &DepthTest,
+    shares: &Shares<'_>,
 ) -> (Vec<Sample<C>>, usize) {
     let last = rows.end == height;
     let top = if rows.start == 0 { f64::MIN } else { rows.start as f64 };
     let bottom = if last { f64::MAX } else { rows.end as f64 };
     let mut projected = footprint.project_between(views, (top, bottom), test);
     let all = projected.count();
+    projected.share(shares.of_points());
     projected.remove(PlaneSearch::default().hidden(projected.points(), test));
-    (projected.samples(views), all)
+    let mut samples = projected.samples(views);
+    shares.apply(&mut samples, projected.shares());
+    (samples, all)
 }
 
 #[cfg(test)]
@@ -178,21 +171,31 @@ mod tests {
         assert_eq!((got.report.propagated, got.report.dropped), (samples.len(), dropped));
         assert_eq!(got.report.occluded, occlusion::remove(&mut samples, settings.depth_test()));
         assert!(got.report.occluded > 0);
-        ViewWeights::of(&views, &target).apply(&mut samples);
+        let view_weights = ViewWeights::of(&views, &target);
+        let shares = Shares {
+            nearness: Nearness::new(views.iter().map(|view| view.camera), &target),
+            camera: &target,
+            offset: 0.0,
+            width: 40,
+            sharing: 4,
+            view_weights: &view_weights,
+        };
+        let mut of_point = shares.of_points();
+        let all = samples.iter().map(|s| of_point(s.view, [s.x, s.y], s.depth)).collect();
+        shares.apply(&mut samples, all);
         let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation);
         problem.add(&samples);
-        let fit = problem.stiffened_by_area().solve(&|_| ());
+        let fit = problem.stiffened_by_area().solve();
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
         // In bands only the order of summation differs.
         let footprint = Footprint::of(&views, &(0..views.len()).collect::<Vec<_>>(), &target, &frame);
         let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation);
         for rows in [0..7, 7..8, 8..30] {
-            let (mut band, _) = visible_in(&rows, 30, &footprint, &views, settings.depth_test());
-            ViewWeights::of(&views, &target).apply(&mut band);
+            let (band, _) = visible_in(&rows, 30, &footprint, &views, settings.depth_test(), &shares);
             problem.add(&band);
         }
         assert_eq!(problem.samples(), samples.len());
-        let banded = problem.stiffened_by_area().solve(&|_| ());
+        let banded = problem.stiffened_by_area().solve();
         assert_eq!(banded.mask, fit.mask);
         let worst = banded.values.iter().zip(&fit.values).fold(0.0, |w: f32, (a, b)| w.max((a - b).abs()));
         assert!(worst < 1e-2, "{worst}");

@@ -4,7 +4,9 @@ mod agreement;
 pub mod calibrated;
 pub(crate) mod depth_errors;
 mod exposure;
+pub(crate) mod nearness;
 pub mod rectified;
+mod shares;
 mod smoothing;
 pub mod uncalibrated;
 mod view_weights;
@@ -18,31 +20,15 @@ pub use view_weights::ViewWeights;
 
 use crate::depth::DepthMap;
 use crate::image::Image;
-pub use crate::interpolate::Watch;
 use crate::interpolate::plane::{Convergence, PlaneFit};
 use crate::interpolate::{Cover, HoleCount, Settings};
 use crate::occlusion::DepthTest;
 use crate::sample::Dropped;
 use crate::setting::{FINITE, POSITIVE, SettingError};
 
-/// The method of the third stage.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
-#[non_exhaustive]
-pub enum Method {
-    /// rows for rectified rigs, plane for other scenes.
-    #[default]
-    Auto,
-    /// One spline per row (rectified rigs only).
-    Rows,
-    /// One spline for the whole image.
-    Plane,
-}
-
 /// Settings of a rendering. The defaults are the same for every scene.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RenderSettings {
-    /// The third stage used.
-    pub method: Method,
     /// Fit, holes, and the depth test of the second stage.
     pub interpolation: Settings,
     /// Added to every column, in pixels: registration of the virtual image.
@@ -53,8 +39,8 @@ pub struct RenderSettings {
     /// Use lambda and stiffness as they are. Otherwise they follow from the noise and the slopes of the
     /// photographs, where cameras are known.
     pub keep_smoothing: bool,
-    /// Use only so many views, those that [`ViewWeights`] finds nearest to the virtual camera; all without
-    /// it.
+    /// Use only so many views, those nearest to the virtual camera. Without it four views share in each
+    /// point.
     pub nearest: Option<usize>,
 }
 
@@ -102,17 +88,12 @@ pub enum RenderError {
         /// Width and height expected.
         expected: (usize, usize),
     },
-    /// The row fit was asked for where samples lie between rows.
-    #[error(
-        "the row method needs a rectified rig: the samples of general cameras lie between rows; use the plane method"
-    )]
-    RowsOfGeneralCameras,
     /// A setting or a position outside its range.
     #[error(transparent)]
     Setting(#[from] SettingError),
     /// Images and columns of tracks do not fit.
     #[error(
-        "{images} images have {columns} columns of tracks; at least two views are needed, each with a column"
+        "{images} images have {columns} columns of tracks; views without cameras are made from two photographs, each with a column"
     )]
     Tracks {
         /// Images given.
@@ -210,9 +191,10 @@ impl Rendering {
     }
 
     /// Opacity of each pixel: 1 where a surface was seen or bridged, 0 where the value was made up because
-    /// no view shows what is there.
+    /// no view shows what is there, or where only a guess says how deep it lies.
     pub fn alpha(&self) -> Vec<f32> {
-        self.mask.iter().map(|c| if *c == Cover::Disocclusion { 0.0 } else { 1.0 }).collect()
+        let is_made_up = |cover: &Cover| matches!(cover, Cover::Disocclusion | Cover::Guessed);
+        self.mask.iter().map(|cover| if is_made_up(cover) { 0.0 } else { 1.0 }).collect()
     }
 }
 

@@ -1,20 +1,18 @@
 //! A view from a rectified rig: the three stages run row by row, rows in parallel.
 
+use super::nearness::SHARING;
 use super::{
-    Agreement, Method, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch, check_counts,
-    check_size,
+    Agreement, RenderError, RenderSettings, Rendering, Report, ViewWeights, check_counts, check_size,
 };
 use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
-use crate::interpolate::plane::PlaneProblem;
 use crate::interpolate::rows::{self, RowWork, nearest_depths};
-use crate::interpolate::{Cover, Degree, HoleCount};
+use crate::interpolate::{Cover, HoleCount};
 use crate::occlusion::{self, RowScratch};
 use crate::propagate::{self, Frame, RectifiedView, RigCamera};
 use crate::sample::{Dropped, Sample};
 use crate::setting::FINITE;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Renders the view from `position` on the line of the cameras.
 ///
@@ -28,25 +26,12 @@ pub fn render(
     position: f64,
     settings: &RenderSettings,
 ) -> Result<Rendering, RenderError> {
-    render_watched(views, position, settings, &|_| ())
-}
-
-/// As [`render`]; `watch` is called with the share of the work that is done.
-///
-/// # Errors
-/// As [`render`].
-pub fn render_watched(
-    views: &[RectifiedView<'_>],
-    position: f64,
-    settings: &RenderSettings,
-    watch: Watch<'_>,
-) -> Result<Rendering, RenderError> {
     check(views, position)?;
     settings.check()?;
     let colour = views.iter().any(|v| v.image.channels() == 3);
     match colour {
-        false => render_with::<1>(views, position, settings, watch),
-        true => render_with::<3>(views, position, settings, watch),
+        false => render_with::<1>(views, position, settings),
+        true => render_with::<3>(views, position, settings),
     }
 }
 
@@ -62,41 +47,31 @@ fn check(views: &[RectifiedView<'_>], position: f64) -> Result<(), RenderError> 
     positions.into_iter().try_for_each(|position| Ok(FINITE.check("position", position)?))
 }
 
-pub(crate) struct Job<'a> {
-    pub(crate) views: &'a [RectifiedView<'a>],
-    pub(crate) camera: RigCamera,
-    pub(crate) view_weights: ViewWeights,
-    pub(crate) frame: Frame,
-    pub(crate) settings: &'a RenderSettings,
-    pub(crate) watch: Watch<'a>,
+struct Job<'a> {
+    views: &'a [RectifiedView<'a>],
+    camera: RigCamera,
+    view_weights: ViewWeights,
+    frame: Frame,
+    settings: &'a RenderSettings,
 }
 
 fn render_with<const C: usize>(
     views: &[RectifiedView<'_>],
     position: f64,
     settings: &RenderSettings,
-    watch: Watch<'_>,
 ) -> Result<Rendering, RenderError> {
     let (width, height) = views[0].image.size();
     let agreement = Agreement::of(views);
-    let mut view_weights = ViewWeights::of(views, &position).nearest(settings.nearest).with_noise(&agreement);
+    let mut view_weights =
+        ViewWeights::of(views, &position).nearest(settings.nearest.unwrap_or(SHARING)).with_noise(&agreement);
     let chosen = view_weights.views();
     let settings = &settings.suited_to(&agreement, &view_weights, Measure::Disparity);
     if !settings.keep_exposure {
         view_weights = view_weights.with_gains(&agreement.gains);
     }
-    let whole = |margin| {
-        let frame = Frame::whole(width, height, margin, settings.offset);
-        let camera = RigCamera::new(views, position);
-        Job { views, camera, view_weights, frame, settings, watch }
-    };
-    let rendering = match settings.method {
-        Method::Plane => match settings.interpolation.plane.degree {
-            Degree::Linear => render_plane::<2, C>(&whole(0.5)),
-            Degree::Cubic => render_plane::<4, C>(&whole(0.5)),
-        },
-        Method::Auto | Method::Rows => render_rows::<C>(&whole(rows::MARGIN)),
-    }?;
+    let frame = Frame::whole(width, height, rows::MARGIN, settings.offset);
+    let camera = RigCamera::new(views, position);
+    let rendering = render_rows::<C>(&Job { views, camera, view_weights, frame, settings })?;
     Ok(Rendering { agreement, views: chosen, ..rendering })
 }
 
@@ -107,7 +82,6 @@ fn render_rows<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> 
     let mut keys = vec![f32::NAN; width * height];
     let mut samples = vec![0_u16; width * height];
     let mut counts = vec![RowCount::default(); height];
-    let ready = AtomicUsize::new(0);
     // Blocks of rows share work memory; their borders do not affect the result.
     let block = height.div_ceil(4 * rayon::current_num_threads()).max(1);
     let outputs = values
@@ -124,7 +98,6 @@ fn render_rows<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> 
             *count = strip.survivors_of_row(job, row);
             rows::count(&strip.samples, samples);
             nearest_depths(&strip.samples, keys);
-            (job.watch)((ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / height as f64);
             fit.interpolate(&strip.samples, &job.settings.interpolation, values, mask)
                 .map(|_| ())
                 .map_err(|source| RenderError::Fit { row, source })
@@ -140,24 +113,6 @@ fn render_rows<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> 
     Ok(Rendering { image, mask, depth, counts: samples, views, report, agreement })
 }
 
-/// The same with the plane fit as third stage; the second stage still runs row by row.
-fn render_plane<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> {
-    let Frame { width, height, .. } = job.frame;
-    let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &job.settings.interpolation);
-    let mut strip = Strip::<C>::new(job);
-    let mut counts = Vec::with_capacity(height);
-    for row in 0..height {
-        counts.push(strip.survivors_of_row(job, row));
-        problem.add(&strip.samples);
-    }
-    let report = report(job, &counts, &[])?;
-    let fit = problem.solve(job.watch);
-    let mut keys = fit.depth.data().to_vec();
-    job.disparities(&mut keys);
-    let depth = DepthMap::from_known((width, height), keys, Measure::Disparity);
-    Ok(Rendering { depth, ..Rendering::of_plane::<C>(fit, report, Vec::new(), Agreement::default()) })
-}
-
 impl Job<'_> {
     fn disparities(&self, keys: &mut [f32]) {
         let offset = self.camera.disparity_offset;
@@ -166,7 +121,7 @@ impl Job<'_> {
 }
 
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct RowCount {
+struct RowCount {
     propagated: usize,
     used: usize,
     dropped: Dropped,
@@ -188,20 +143,20 @@ fn report(job: &Job<'_>, counts: &[RowCount], mask: &[Cover]) -> Result<Report, 
     if report.used > 0 { Ok(report) } else { Err(RenderError::NoOverlap { pixels, dropped }) }
 }
 
-pub(crate) struct Strip<const C: usize> {
-    pub(crate) samples: Vec<Sample<C>>,
+struct Strip<const C: usize> {
+    samples: Vec<Sample<C>>,
     scratch: RowScratch<C>,
 }
 
 impl<const C: usize> Strip<C> {
-    pub(crate) fn new(job: &Job<'_>) -> Self {
+    fn new(job: &Job<'_>) -> Self {
         let used = (0..job.views.len()).filter(|view| job.view_weights.uses(*view)).count();
         let samples = Vec::with_capacity(job.frame.width * used);
         Self { samples, scratch: RowScratch::default() }
     }
 
     /// The first two stages for one row: propagates samples and removes hidden ones.
-    pub(crate) fn survivors_of_row(&mut self, job: &Job<'_>, y: usize) -> RowCount {
+    fn survivors_of_row(&mut self, job: &Job<'_>, y: usize) -> RowCount {
         let mut count = RowCount::default();
         self.samples.clear();
         for (index, view) in job.views.iter().enumerate().filter(|(i, _)| job.view_weights.uses(*i)) {
@@ -255,16 +210,13 @@ mod tests {
     #[test]
     fn the_number_of_threads_changes_no_bit() {
         let parts = [scene(64, 33, 3), scene(64, 33, 3)];
-        for method in [Method::Rows, Method::Plane] {
-            let settings = RenderSettings { method, ..RenderSettings::default() };
-            let run = |threads| {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                pool.install(|| render(&views(&parts), 0.3, &settings).unwrap())
-            };
-            let one = run(1);
-            assert_eq!(one, run(2));
-            assert_eq!(one, run(5));
-        }
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| render(&views(&parts), 0.3, &RenderSettings::default()).unwrap())
+        };
+        let one = run(1);
+        assert_eq!(one, run(2));
+        assert_eq!(one, run(5));
     }
 
     #[test]
@@ -282,18 +234,15 @@ mod tests {
         assert!(got.depth.data().iter().all(|d| (d - 4.0).abs() < 1e-5));
     }
 
-    /// Both methods give the disparity of the nearest visible sample, and none in holes.
+    /// Pixels have the disparity of the nearest visible sample, and none in holes.
     #[test]
     fn the_virtual_view_has_disparities() {
         let parts = [scene(48, 9, 1)];
-        for method in [Method::Rows, Method::Plane] {
-            let got =
-                render(&views(&parts), 0.0, &RenderSettings { method, ..RenderSettings::default() }).unwrap();
-            for (p, d) in got.depth.data().iter().enumerate() {
-                assert_eq!(d.is_nan(), got.mask[p] != Cover::Seen, "{method:?} {p}");
-                let own = parts[0].1.data()[p];
-                assert!(d.is_nan() || own.is_nan() || (d - own).abs() < 1.0, "{method:?} {p}: {d} {own}");
-            }
+        let got = render(&views(&parts), 0.0, &RenderSettings::default()).unwrap();
+        for (p, d) in got.depth.data().iter().enumerate() {
+            assert_eq!(d.is_nan(), got.mask[p] != Cover::Seen, "{p}");
+            let own = parts[0].1.data()[p];
+            assert!(d.is_nan() || own.is_nan() || (d - own).abs() < 1.0, "{p}: {d} {own}");
         }
     }
 

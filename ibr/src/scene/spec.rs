@@ -1,5 +1,6 @@
 //! A scene file as written.
 
+use super::unknown::Unknown;
 use crate::camera::colmap::model_files;
 use hybank_core::messages::Quoted;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
@@ -27,19 +28,15 @@ pub struct SceneSpec {
     /// File of cameras of neural rendering (`transforms.json`); without `[[view]]` tables its frames with
     /// depth are the views.
     pub transforms: Option<PathBuf>,
-    /// Calibration file of the Middlebury benchmark; without `[[view]]` tables the pair beside it is the
-    /// views.
-    pub calib: Option<PathBuf>,
     /// Whether the world frame of the cameras is left-handed.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub mirrored: bool,
+    /// What unknown depths are taken for.
+    pub unknown: Option<Unknown>,
     /// Stored value / scale = disparity, in views that do not say it themselves.
     pub disparity_scale: Option<f64>,
     /// Stored value / scale = depth, in views that do not say it themselves.
     pub depth_scale: Option<f64>,
-    /// What [`complete`](super::complete) decided; it is reported to the user.
-    #[serde(skip)]
-    pub notes: Vec<String>,
 }
 
 /// A view.
@@ -132,7 +129,7 @@ impl SceneSpec {
         let images = self.view.iter().map(|view| &view.image);
         let maps = self.view.iter().flat_map(|view| [&view.disparity, &view.depth]).flatten();
         let maps = maps.filter(|map| matches!(MapSource::of(map), MapSource::File(_)));
-        let lists = [&self.matches, &self.transforms, &self.calib].into_iter().flatten();
+        let lists = [&self.matches, &self.transforms].into_iter().flatten();
         let models = self.view.iter().map(|view| &view.colmap).chain([&self.colmap]).flatten();
         let models = models.flat_map(|model| model_files().map(|file| model.join(file)));
         let files = images.chain(maps).chain(lists).cloned().chain(models);
@@ -149,8 +146,8 @@ impl SceneSpec {
 pub(super) const KEYS: [(&str, &str); 21] = [
     ("matches", "matches-only"),
     ("transforms", "calibrated"),
-    ("calib", "rectified"),
     ("mirrored", "calibrated"),
+    ("unknown", "rectified, calibrated"),
     ("disparity", "rectified"),
     ("disparity_scale", "rectified"),
     ("disparity_offset", "rectified"),

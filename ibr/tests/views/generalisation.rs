@@ -7,7 +7,7 @@ use crate::support::noise::noisy;
 use hybank_ibr::depth::{DepthMap, Measure};
 use hybank_ibr::image::{Image, quality};
 use hybank_ibr::partial::densify;
-use hybank_ibr::pipeline::{Method, RenderSettings, rectified};
+use hybank_ibr::pipeline::{RenderSettings, rectified};
 use hybank_ibr::propagate::RectifiedView;
 
 const WIDTH: usize = 200;
@@ -175,16 +175,12 @@ fn every_kind_of_scene_is_held_against_rounding() {
         let views = [view(0), view(1)];
         for (position, margin) in [0.5, 0.3].into_iter().zip(margins) {
             let (truth, _) = record(&layers, position);
-            let render = |method| {
-                let settings = RenderSettings { method, ..RenderSettings::default() };
-                psnr(&rectified::render(&views, position, &settings).unwrap().image, &truth, None)
-            };
             let baseline = psnr(&rounded(&views, position), &truth, None);
             let copy = psnr(&ends[0].0, &truth, None);
-            let (rows, plane) = (render(Method::Auto), render(Method::Plane));
-            let figures = format!(
-                "{name} at {position}: rows {rows:.2}, plane {plane:.2}, rounded {baseline:.2}, copy {copy:.2} dB"
-            );
+            let rows = rectified::render(&views, position, &RenderSettings::default()).unwrap().image;
+            let rows = psnr(&rows, &truth, None);
+            let figures =
+                format!("{name} at {position}: rows {rows:.2}, rounded {baseline:.2}, copy {copy:.2} dB");
             println!("{figures}");
             if !(rows > baseline + margin && rows > copy + 5.0) {
                 behind.push(figures);

@@ -14,8 +14,15 @@ pub(crate) struct Projected {
     points: Points,
     weights: Vec<f32>,
     doubtful: Vec<bool>,
+    origins: Vec<Origin>,
+    /// Shares of the views in the places of the pixels.
+    shares: Vec<f32>,
     tiles: Vec<ProjectedTile>,
 }
+
+/// Share of a view below which its samples hide nothing: outlines that oblique views show tear holes into
+/// what near ones show.
+const LEAST_SHARE: f32 = 0.02;
 
 #[derive(Debug, Clone, Copy)]
 struct ProjectedTile {
@@ -65,7 +72,9 @@ impl Projected {
         points.spacing.extend_from_slice(&spacings[..count]);
         self.weights.extend_from_slice(&weights[..count]);
         self.doubtful.extend_from_slice(&doubtful[..count]);
-        points.origin.extend_from_slice(&origins[..count]);
+        points.hides.extend(origins[..count].iter().map(|origin| *origin != Origin::Filled));
+        self.origins.extend_from_slice(&origins[..count]);
+        self.shares.resize(points.len(), 1.0);
     }
 
     pub(crate) fn points(&self) -> &Points {
@@ -80,8 +89,25 @@ impl Projected {
         places.iter().for_each(|i| self.points.own[*i as usize] = false);
     }
 
+    /// Gives each pixel the share of its view in its place; what has hardly any hides nothing.
+    pub(crate) fn share(&mut self, mut share: impl FnMut(u16, [f64; 2], f32) -> f32) {
+        let Self { points, tiles, shares, .. } = self;
+        let ends = tiles.iter().skip(1).map(|next| next.first_place).chain([points.len()]);
+        for (tile, end) in tiles.iter().zip(ends) {
+            for i in (tile.first_place..end).filter(|i| !points.x[*i].is_nan()) {
+                shares[i] = share(tile.view, [points.x[i], points.y[i]], points.depth[i]);
+                points.hides[i] &= shares[i] > LEAST_SHARE;
+            }
+        }
+    }
+
+    /// The shares of the [`samples`](Self::samples).
+    pub(crate) fn shares(&self) -> Vec<f32> {
+        self.shares.iter().zip(&self.points.own).filter(|(_, own)| **own).map(|(share, _)| *share).collect()
+    }
+
     pub(crate) fn samples<const C: usize>(&self, views: &[CalibratedView<'_>]) -> Vec<Sample<C>> {
-        let Self { points, weights, doubtful, tiles } = self;
+        let Self { points, weights, doubtful, tiles, origins, .. } = self;
         let mut samples = Vec::with_capacity(self.count());
         let ends = tiles.iter().skip(1).map(|next| next.first_place).chain([points.len()]);
         for (tile, end) in tiles.iter().zip(ends) {
@@ -98,7 +124,7 @@ impl Projected {
                     pixel,
                     view: tile.view,
                     doubtful: doubtful[i],
-                    origin: points.origin[i],
+                    origin: origins[i],
                 }
             };
             samples.extend((tile.first_place..end).filter(|i| points.own[*i]).map(sample));

@@ -21,7 +21,7 @@ fn scene(text: &str) -> (tempfile::TempDir, PathBuf) {
 fn read(text: &str, options: &LoadOptions) -> Result<Scene, String> {
     let (_dir, path) = scene(text);
     let spec = parse(text, &path).map_err(|e| e.to_string())?;
-    load(&spec, &path, options, &|_| ()).map_err(|e| e.to_string())
+    load(&spec, &path, options).map_err(|e| e.to_string())
 }
 
 const RIG: &str = r#"
@@ -46,7 +46,11 @@ fn a_rectified_rig_is_read() {
     let Kind::Rectified { views, positions } = read_rig.kind else { panic!("{read_rig:?}") };
     assert_eq!((views.len(), &positions[..], read_rig.filled), (2, &[0.5][..], 2));
     assert_eq!((views[0].map.data()[3], views[1].map.data()[3]), (1.0, 4.0));
-    let without = LoadOptions { view: Some("right".into()), fill: false, ..LoadOptions::default() };
+    let without = LoadOptions {
+        view: Some("right".into()),
+        unknown: Some(crate::scene::Unknown::Drop),
+        ..LoadOptions::default()
+    };
     let Kind::Rectified { views, positions } = read(RIG, &without).unwrap().kind else { panic!() };
     assert_eq!((views.len(), &positions[..]), (1, &[1.0][..]));
     assert!(views[0].map.data()[3].is_nan());

@@ -30,7 +30,7 @@ impl Case {
     pub(crate) fn rendered(&self, damage: Damage, folder: &Path) -> Result<Rendered, Box<dyn Error>> {
         let spec = damage.applied(&self.spec, &self.path, folder)?;
         let options = LoadOptions { depth_step: damage.step(), ..LoadOptions::default() };
-        let scene = scene::load(&spec, &self.path, &options, &|_| ())?;
+        let scene = scene::load(&spec, &self.path, &options)?;
         let rendering = render(&scene)?;
         let psnr = self.psnr(&rendering.image)?;
         Ok(Rendered { psnr, coverage: rendering.coverage() })
