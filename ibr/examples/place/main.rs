@@ -11,8 +11,8 @@
 mod choice;
 
 use choice::Choice;
-use hybank_ibr::analysis::{Predicted, Predictor};
-use hybank_ibr::pipeline::{RenderError, RenderSettings};
+use hybank_ibr::analysis::Predictor;
+use hybank_ibr::pipeline::{Geometry, RenderError, RenderSettings};
 use hybank_ibr::scene::{Kind, LoadOptions, Scene, SourceView, load, parse};
 use std::error::Error;
 use std::path::Path;
@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-fn choose<P: Predicted>(
+fn choose<P: Geometry>(
     scene: &Scene,
     sources: &[SourceView<P>],
     cameras: &[P],

@@ -5,9 +5,8 @@ use super::calibrate::LeastSquares;
 use super::examine::{examine, spacing};
 use super::regressors::{CAUSE_OF, REGRESSORS, Regressors, difference};
 use super::variogram::Variogram;
-use crate::camera::Camera;
-use crate::pipeline::{RenderError, RenderSettings, Rendering, calibrated, rectified};
-use crate::propagate::{View, Viewpoint};
+use crate::pipeline::{Geometry, RenderError, RenderSettings, Rendering};
+use crate::propagate::View;
 use std::ops::Range;
 
 /// Weights of the mean absolute error for photographs, from "Cones" and "Teddy": bend, noise, slope, jitter,
@@ -93,39 +92,6 @@ impl ViewError {
     }
 }
 
-/// Cameras whose views are rendered, and their errors predicted.
-pub trait Predicted: Viewpoint {
-    /// The view of this camera with `size` pixels; that of a rectified rig has the size of the photographs.
-    fn render(
-        &self,
-        views: &[View<'_, Self>],
-        size: (usize, usize),
-        settings: &RenderSettings,
-    ) -> Result<Rendering, RenderError>;
-}
-
-impl Predicted for f64 {
-    fn render(
-        &self,
-        views: &[View<'_, Self>],
-        _: (usize, usize),
-        settings: &RenderSettings,
-    ) -> Result<Rendering, RenderError> {
-        rectified::render(views, *self, settings)
-    }
-}
-
-impl Predicted for Camera {
-    fn render(
-        &self,
-        views: &[View<'_, Self>],
-        size: (usize, usize),
-        settings: &RenderSettings,
-    ) -> Result<Rendering, RenderError> {
-        calibrated::render(views, self, size, settings)
-    }
-}
-
 /// What renderings are examined with.
 pub(super) struct Study {
     pub(super) settings: RenderSettings,
@@ -160,7 +126,7 @@ pub(super) fn judge(examined: Examined, calibration: Calibration) -> ViewError {
 
 impl Calibration {
     /// Leaves views out in turn, renders them from the others and explains the errors by the causes.
-    pub(super) fn of<P: Predicted>(views: &[View<'_, P>], study: &Study) -> Result<Self, RenderError> {
+    pub(super) fn of<P: Geometry>(views: &[View<'_, P>], study: &Study) -> Result<Self, RenderError> {
         let (mut absolute, mut square) = (LeastSquares::default(), LeastSquares::default());
         let used = if views.len() < 2 { 0 } else { views.len().min(LEFT_OUT) };
         for k in 0..used {

@@ -1,16 +1,16 @@
 //! What the error of a rendered view comes from, cause by cause: the sizes are taken from the view, its
 //! depths and its sample counts.
 
-use super::estimate::{Examined, Predicted, Study};
+use super::estimate::{Examined, Study};
 use super::jitter::depth_jitter;
 use super::regressors::{regressors, slopes};
 use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
-use crate::pipeline::{RenderError, RenderSettings, ViewWeights};
+use crate::pipeline::{Geometry, RenderError, RenderSettings, Renderer, ViewWeights};
 use crate::propagate::{View, nearest};
 
 /// The view of a camera with the regressors of its pixels; neighbouring views are `spacing` apart.
-pub(super) fn examine<P: Predicted>(
+pub(super) fn examine<P: Geometry>(
     views: &[View<'_, P>],
     camera: &P,
     size: (usize, usize),
@@ -18,7 +18,7 @@ pub(super) fn examine<P: Predicted>(
     spacing: f64,
 ) -> Result<Examined, RenderError> {
     let settings = &study.settings;
-    let rendering = camera.render(views, size, settings)?;
+    let rendering = Renderer::new(views, settings)?.render(camera, size)?;
     let jitter = depth_jitter(views, camera, settings, &rendering.image, study.noise)?;
     let view_weights = ViewWeights::of(views, camera).with_noise(&rendering.agreement);
     let (shares, gain) = shares(views, camera, &view_weights);
@@ -31,8 +31,9 @@ pub(super) fn examine<P: Predicted>(
         let shares = f64::max(shares, 1.0 / f64::from(rendering.counts[p].max(1)));
         let displacement = ((shares + gain) / 2.0).sqrt();
         let slope = f64::from(slopes[p]) * displacement;
-        // The noise of the photograph that a view is compared with adds to that of the views.
-        let (bend, noise) = (f64::from(bends[p]), (1.0 + shares).sqrt());
+        // Samples of several views lie closer, and the error of a smooth texture is in proportion to their
+        // distance squared. The noise of the photograph that a view is compared with adds to that of the views.
+        let (bend, noise) = (shares * f64::from(bends[p]), (1.0 + shares).sqrt());
         [bend, noise, slope, f64::from(jitter[p]), f64::from(edges[p]), 0.0]
     };
     let regressors = regressors(&rendering, &study.variogram, of_seen);
@@ -41,7 +42,7 @@ pub(super) fn examine<P: Predicted>(
 
 /// Mean distance between a view and the one nearest to it; of views at one point that from the camera, or
 /// one.
-pub(super) fn spacing<P: Predicted>(views: &[View<'_, P>], camera: &P) -> f64 {
+pub(super) fn spacing<P: Geometry>(views: &[View<'_, P>], camera: &P) -> f64 {
     let distance = |i: usize| {
         let other = nearest(views, i, (0..views.len()).filter(|other| *other != i));
         other.map_or(f64::INFINITY, |other| views[other].camera.distance(&views[i].camera))
@@ -53,7 +54,7 @@ pub(super) fn spacing<P: Predicted>(views: &[View<'_, P>], camera: &P) -> f64 {
 
 /// Sum of the squared shares of the views in a pixel that all of them see, and the same times their squared
 /// distances.
-fn shares<P: Predicted>(views: &[View<'_, P>], camera: &P, view_weights: &ViewWeights) -> (f64, f64) {
+fn shares<P: Geometry>(views: &[View<'_, P>], camera: &P, view_weights: &ViewWeights) -> (f64, f64) {
     let weight = |i: usize| f64::from(view_weights.weight(i as u16));
     let total: f64 = (0..views.len()).map(weight).sum();
     let square = |i: usize| (weight(i) / total).powi(2);

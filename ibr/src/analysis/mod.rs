@@ -40,7 +40,7 @@ mod predictor;
 mod regressors;
 mod variogram;
 
-pub use estimate::{Calibration, Predicted, Totals, ViewError};
+pub use estimate::{Calibration, Totals, ViewError};
 pub use jitter::{depth_jitter, with_noise};
 pub use predictor::Predictor;
 

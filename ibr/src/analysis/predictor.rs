@@ -1,12 +1,12 @@
 //! The error of any number of views, with weights that are calibrated once.
 
-use super::estimate::{Calibration, Predicted, Study, ViewError, judge};
+use super::estimate::{Calibration, Study, ViewError, judge};
 use super::examine::{examine, spacing};
 use super::jitter::map_noise;
 use super::variogram::Variogram;
 use crate::depth::DepthMap;
 use crate::image::Image;
-use crate::pipeline::{Agreement, Exposure, RenderError, RenderSettings, without_drift};
+use crate::pipeline::{Agreement, Exposure, Geometry, RenderError, RenderSettings, without_drift};
 use crate::propagate::View;
 
 /// Views with the weights that are calibrated on them, for any number of predictions.
@@ -19,7 +19,7 @@ pub struct Predictor<'a, P> {
     agreement: Agreement,
 }
 
-impl<'a, P: Predicted> Predictor<'a, P> {
+impl<'a, P: Geometry> Predictor<'a, P> {
     /// Leaves each view out in turn and calibrates.
     ///
     /// # Errors

@@ -1,5 +1,6 @@
 //! Cameras: 3 x 4 matrices, d x~ = Pi X~ (thesis eq. 2.1), pixel centres at integers.
 
+mod camera_path;
 pub mod colmap;
 mod lens;
 mod list;
@@ -90,6 +91,11 @@ impl Camera {
     /// The same camera with a lens: its pixels are distorted positions, while Pi maps to undistorted ones.
     pub fn with_lens(self, lens: Lens) -> Self {
         Self { lens: Some(lens), ..self }
+    }
+
+    /// The same camera without its lens.
+    pub(crate) fn without_lens(&self) -> Self {
+        Self { lens: None, ..*self }
     }
 
     /// A metric camera of the same hand and lens with another matrix; `None` if that is singular.

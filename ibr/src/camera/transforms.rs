@@ -4,7 +4,7 @@
 //! rows y and z of its inverse therefore change their sign. Pixel centres are half-integers there, so the
 //! principal point is shifted by half a pixel on reading.
 
-use super::list::{CameraList, Frame, Inner};
+use super::list::{CameraList, Frame, Inner, portable};
 use crate::files::{self, CHECK_THE_PATH, InputError};
 use hybank_core::messages::{Quoted, of_json};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4};
@@ -26,6 +26,7 @@ struct FileSpec {
 struct FrameSpec {
     file_path: String,
     depth_file_path: Option<String>,
+    mask_path: Option<String>,
     camera_model: Option<String>,
     transform_matrix: Vec<[f64; 4]>,
     #[serde(flatten)]
@@ -68,8 +69,9 @@ pub fn parse_transforms(text: &str, path: &Path) -> Result<CameraList, InputErro
         check_model(spec.camera_model.as_deref()).map_err(fault)?;
         let inner = spec.inner.or(&file.inner).checked().map_err(fault)?;
         let pose = world_to_camera(&spec.transform_matrix).map_err(fault)?;
-        let depth = spec.depth_file_path.map(|path| PathBuf::from(path.replace('\\', "/")));
-        Ok(Frame { image: image_path(&spec.file_path), depth, id, pose, inner })
+        let [depth, mask] =
+            [spec.depth_file_path, spec.mask_path].map(|path| path.map(|path| portable(&path)));
+        Ok(Frame { image: image_path(&spec.file_path), depth, mask, id, pose, inner })
     };
     let frames = (1..).zip(file.frames).map(one).collect::<Result<_, InputError>>()?;
     Ok(CameraList::new(path.into(), frames))
@@ -89,15 +91,13 @@ fn check_model(model: Option<&str>) -> Result<(), String> {
     }
 }
 
-/// The path of an image; the synthetic scenes of NeRF leave the extension out, and Windows writes
-/// backslashes.
+/// The path of an image; the synthetic scenes of NeRF leave the extension out.
 fn image_path(name: &str) -> PathBuf {
-    let name = name.replace('\\', "/");
-    let path = PathBuf::from(&name);
-    if path.extension().is_some() { path } else { PathBuf::from(format!("{name}.png")) }
+    let path = portable(name);
+    if path.extension().is_some() { path } else { PathBuf::from(format!("{}.png", path.display())) }
 }
 
-fn world_to_camera(rows: &[[f64; 4]]) -> Result<Matrix3x4<f64>, String> {
+pub(super) fn world_to_camera(rows: &[[f64; 4]]) -> Result<Matrix3x4<f64>, String> {
     if !(3..=4).contains(&rows.len()) {
         return Err(format!("transform_matrix has {} rows: it needs 3 or 4", rows.len()));
     }
@@ -146,7 +146,7 @@ impl Inner {
         )
     }
 
-    fn checked(self) -> Result<Self, String> {
+    pub(super) fn checked(self) -> Result<Self, String> {
         let bends = [("k3", self.k3), ("k4", self.k4)];
         if self.is_fisheye == Some(true) || bends.iter().any(|(_, k)| k.is_some_and(|k| k != 0.0)) {
             return Err("the lens has more than k1, k2, p1 and p2; undistort the images first".into());

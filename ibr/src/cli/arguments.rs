@@ -138,6 +138,10 @@ pub(super) struct RenderArguments {
     /// cameras.
     #[arg(long, value_name = "K")]
     pub(super) nearest: Option<usize>,
+    /// Render the cameras of this file instead of [virtual]: a camera path of nerfstudio, a transforms.json or
+    /// the folder of a COLMAP model.
+    #[arg(long, value_name = "FILE")]
+    pub(super) cameras: Option<PathBuf>,
     /// Bits per value of a PNG, 8 or 16.
     #[arg(long, value_name = "N", value_enum, default_value_t = Levels::Eight, hide_possible_values = true)]
     pub(super) bits: Levels,
@@ -247,6 +251,9 @@ pub(super) struct InitArguments {
     /// Scene file to write; `-` is standard output. Its paths are relative to its folder where they can be.
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: PathBuf,
+    /// The virtual view is the place of this image, which is no view then; also one that only has a camera.
+    #[arg(long, value_name = "NAME")]
+    pub(super) view: Option<String>,
     /// Overwrite an existing file.
     #[arg(long)]
     pub(super) force: bool,

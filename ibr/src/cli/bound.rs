@@ -4,9 +4,9 @@ use super::arguments::BoundArguments;
 use super::failure::{Failure, failed};
 use super::inputs;
 use super::output::{self, Encoded, Outputs, Part, check_files};
-use crate::analysis::{Cause, Predicted, Predictor, Totals, ViewError};
+use crate::analysis::{Cause, Predictor, Totals, ViewError};
 use crate::image::{Image, Levels, pfm, quality};
-use crate::pipeline::{Agreement, RenderError};
+use crate::pipeline::{Agreement, Geometry, RenderError};
 use crate::scene::{Kind, Scene, SourceView};
 use hybank_core::messages::Quoted;
 use serde::Serialize;
@@ -37,7 +37,7 @@ struct Job<'a> {
 
 impl Job<'_> {
     /// Predicts the views of `cameras`, writes their files and prints the report.
-    fn predict<P: Predicted>(
+    fn predict<P: Geometry>(
         self,
         views: &[SourceView<P>],
         cameras: &[P],
@@ -65,7 +65,7 @@ impl Job<'_> {
 
 /// The scene, and the files of each of its virtual views.
 fn read(arguments: &BoundArguments, outputs: Outputs) -> Result<(Scene, Vec<Outputs>), Failure> {
-    let source = arguments.scene.source()?;
+    let source = arguments.scene.source(None)?;
     let files = outputs.of_frames(source.frames(&arguments.scene));
     check_files(&files, None, &source, &arguments.scene, arguments.force)?;
     let scene = arguments.scene.load(&source, None, None)?;

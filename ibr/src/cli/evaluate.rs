@@ -4,9 +4,9 @@
 use super::arguments::EvaluateArguments;
 use super::failure::{Failure, failed, usage};
 use super::output;
-use crate::analysis::{Predicted, Predictor};
-use crate::image::{Image, Levels, quality, read_image};
-use crate::pipeline::{RenderError, Rendering};
+use crate::analysis::Predictor;
+use crate::image::{Image, Levels, quality};
+use crate::pipeline::{Geometry, RenderError, Renderer, Rendering};
 use crate::scene::{Kind, LoadOptions, Scene, SourceView, ViewSpec, each_left_out};
 use hybank_core::messages::Quoted;
 use indicatif::ProgressBar;
@@ -18,16 +18,15 @@ pub(super) fn run(arguments: &EvaluateArguments) -> Result<(), Failure> {
     if arguments.scene.view.is_some() || arguments.scene.truth.is_some() {
         return usage("--view and --truth: every view that is left out is compared with its own photograph");
     }
-    let source = arguments.scene.source()?;
+    let source = arguments.scene.source(None)?;
     let views: Vec<&ViewSpec> = source.spec.view.iter().step_by(arguments.every).collect();
     let files = arguments.pictures(views.len())?;
     let names: Vec<String> = views.iter().map(|view| view.label()).collect();
     let options = LoadOptions { nearest: arguments.nearest, ..arguments.scene.options() };
     let (bar, mut found) = (ProgressBar::new(names.len() as u64), Vec::new());
     each_left_out(&source.spec, source.path(), &options, &names, |index, scene| {
-        let truth =
-            read_image(&source.file(&views[index].image), arguments.scene.max_pixels).map_err(failed)?;
-        let job = Job { arguments, scene: &scene, truth };
+        let (truth, hidden) = source.photograph(views[index], arguments.scene.max_pixels)?;
+        let job = Job { arguments, scene: &scene, truth, hidden };
         let (rendering, predicted) = job.render()?;
         found.push(job.compare(&names[index], &rendering, predicted)?);
         if let Some(path) = files.get(index) {
@@ -60,6 +59,8 @@ struct Job<'a> {
     arguments: &'a EvaluateArguments,
     scene: &'a Scene,
     truth: Image,
+    /// Its pixels that show no part of the scene.
+    hidden: Vec<bool>,
 }
 
 /// What was found for one view.
@@ -86,7 +87,7 @@ impl Job<'_> {
         }
     }
 
-    fn at<P: Predicted>(
+    fn at<P: Geometry>(
         &self,
         views: &[SourceView<P>],
         camera: &P,
@@ -95,7 +96,8 @@ impl Job<'_> {
         let mut settings = self.arguments.scene.settings(self.scene.offset);
         settings.nearest = self.arguments.nearest;
         let (views, size): (Vec<_>, _) = (views.iter().map(SourceView::view).collect(), self.truth.size());
-        let rendering = camera.render(&views, size, &settings).map_err(named)?;
+        let rendering =
+            Renderer::new(&views, &settings).and_then(|r| r.render(camera, size)).map_err(named)?;
         let predicted = match self.arguments.predict {
             true => Some(Predictor::new(&views, &settings).and_then(|p| p.at(camera, size)).map_err(named)?),
             false => None,
@@ -104,7 +106,9 @@ impl Job<'_> {
     }
 
     fn compare(&self, name: &str, rendering: &Rendering, predicted: Option<f64>) -> Result<Row, Failure> {
-        let compared = quality::compare(&rendering.image, &self.truth, None);
+        let shown: Vec<bool> = self.hidden.iter().map(|hidden| !hidden).collect();
+        let region = (!shown.is_empty()).then_some(&shown[..]);
+        let compared = quality::compare(&rendering.image, &self.truth, region);
         let compared = compared.map_err(|e| Failure::Input(format!("{}: {e}", Quoted(name))))?;
         let found = compared.ok_or_else(|| Failure::Input(format!("{}: it has no pixel", Quoted(name))))?;
         let (psnr, ssim, mae) = (found.psnr, found.ssim, found.mae);

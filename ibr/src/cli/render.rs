@@ -3,44 +3,39 @@
 mod concerns;
 mod outputs;
 mod path;
+mod ready;
 
 use super::arguments::RenderArguments;
 use super::failure::{Failure, PROGRAM, failed, of_view, usage};
 use super::output::{self, Outputs, check_files};
 use super::summary::Summary;
 use crate::image::{Image, quality};
-use crate::pipeline::uncalibrated::UncalibratedSettings;
-use crate::pipeline::{Rendering, calibrated, rectified, uncalibrated};
-use crate::scene::{Kind, Scene, SourceView};
+use crate::interpolate::HoleFill;
+use crate::scene::{Kind, Scene};
 use concerns::Concerns;
 use hybank_core::messages::Quoted;
 use hybank_program::is_dash;
 use indicatif::ProgressBar;
 use path::Film;
+use ready::{Ready, Rendered};
 use std::path::Path;
 use std::time::Instant;
-
-/// A rendering with the region that is compared, unless that is the whole image.
-struct Rendered {
-    rendering: Rendering,
-    hull: Option<Vec<bool>>,
-    geometry: Option<uncalibrated::GeometryReport>,
-}
 
 pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     check(arguments)?;
     let start = Instant::now();
     let (scene, files) = read(arguments)?;
-    let preparation = start.elapsed().as_secs_f64();
     check_kind(&scene.kind, arguments)?;
     check_nearest(&scene.kind, arguments)?;
     let frames = files.len();
     let truth = arguments.scene.truth()?;
     let mut film = path::is_film(&arguments.output, frames).then(|| Film::new(arguments)).transpose()?;
     let (mut summaries, mut concerns) = (Vec::new(), Concerns::default());
+    let ready = Ready::new(&scene, arguments).map_err(|e| e.in_file(&arguments.scene.file))?;
+    let preparation = start.elapsed().as_secs_f64();
     let bar = ProgressBar::new(frames as u64);
     for (frame, files) in files.iter().enumerate() {
-        let (done, mut summary) = timed(&scene, frame, preparation, arguments)?;
+        let (done, mut summary) = timed(&scene, &ready, frame, preparation, arguments)?;
         if let (Some(truth), Some(path)) = (&truth, &arguments.scene.truth) {
             compare(&mut summary, &done, truth, path)?;
         }
@@ -59,13 +54,14 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
 /// One virtual view of a scene, and its summary.
 fn timed(
     scene: &Scene,
+    ready: &Ready<'_>,
     frame: usize,
     preparation: f64,
     arguments: &RenderArguments,
 ) -> Result<(Rendered, Summary), Failure> {
     let start = Instant::now();
     let named = |e: Failure| of_view(e, frame, scene.kind.frames()).in_file(&arguments.scene.file);
-    let done = render(scene, frame, arguments).map_err(named)?;
+    let done = ready.render(frame).map_err(named)?;
     let mut summary = Summary::new(&done.rendering, start.elapsed().as_secs_f64(), scene.filled);
     summary.preparation_seconds = preparation;
     summary.geometry = done.geometry.clone();
@@ -80,6 +76,9 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
     }
     if arguments.nearest == Some(0) {
         return usage("--nearest 0: at least one view must be used");
+    }
+    if arguments.cameras.is_some() && arguments.scene.view.is_some() {
+        return usage("--cameras and --view both say which views are rendered; leave one out");
     }
     arguments.scene.check()?;
     arguments.check_outputs()
@@ -96,6 +95,7 @@ fn check_kind(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure> {
         ("--depth-step", "a scene with depth", arguments.scene.depth_step > 1 && !has_cameras),
         ("--keep-cameras", "a scene with cameras", arguments.scene.keep_cameras && !has_cameras),
         ("--keep-exposure", "a scene with cameras", arguments.scene.keep_exposure && !has_cameras),
+        ("--fill bridge", "a scene with cameras", arguments.fill == HoleFill::Bridge && !has_cameras),
     ];
     match unused.iter().find(|(.., is_unused)| *is_unused) {
         Some((option, needs, _)) => {
@@ -123,38 +123,13 @@ fn check_nearest(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure
 
 /// The scene, and the files of each of its virtual views.
 fn read(arguments: &RenderArguments) -> Result<(Scene, Vec<Outputs>), Failure> {
-    let source = arguments.scene.source()?;
+    let source = arguments.scene.source(arguments.cameras.as_deref())?;
     let frames = source.frames(&arguments.scene);
     path::check(arguments, frames)?;
     let files = path::outputs(arguments, frames);
     let film = Some(arguments.output.as_path()).filter(|path| path::is_film(path, frames));
     check_files(&files, film.filter(|path| !is_dash(path)), &source, &arguments.scene, arguments.force)?;
     Ok((arguments.scene.load(&source, arguments.unknown, arguments.nearest)?, files))
-}
-
-/// The virtual view `frame` of a list or path; 0 if there is one.
-fn render(scene: &Scene, frame: usize, arguments: &RenderArguments) -> Result<Rendered, Failure> {
-    let settings = arguments.settings(scene.offset);
-    let whole = |rendering| Rendered { rendering, hull: None, geometry: None };
-    match &scene.kind {
-        Kind::Rectified { views, positions } => {
-            let views: Vec<_> = views.iter().map(SourceView::view).collect();
-            rectified::render(&views, positions[frame], &settings).map(whole).map_err(failed)
-        }
-        Kind::Calibrated { views, cameras, size } => {
-            let views: Vec<_> = views.iter().map(SourceView::view).collect();
-            calibrated::render(&views, &cameras[frame], *size, &settings).map(whole).map_err(failed)
-        }
-        Kind::Uncalibrated { images, tracks, targets, size } => {
-            let images: Vec<&Image> = images.iter().collect();
-            let seed = arguments.seed.unwrap_or(UncalibratedSettings::default().seed);
-            let special = UncalibratedSettings { seed };
-            let done = uncalibrated::render(&images, tracks, &targets[frame], *size, &settings, &special)
-                .map_err(failed)?;
-            let geometry = Some(done.geometry);
-            Ok(Rendered { rendering: done.rendering, hull: Some(done.region), geometry })
-        }
-    }
 }
 
 /// Figures of merit over the region of the rendering, and over the whole image if the two differ.

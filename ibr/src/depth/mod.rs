@@ -1,6 +1,7 @@
 //! Depth and disparity maps: one value per pixel, NaN where unknown.
 
 mod fill;
+mod mesh;
 mod relief;
 
 use crate::lanes::bounds;
@@ -8,6 +9,7 @@ use crate::setting::{PIXELS, SCALE, STEP, SettingError};
 pub(crate) use fill::fill_empty_rows;
 pub use fill::fill_unknown;
 pub(crate) use fill::{NONE, for_holes};
+pub(crate) use mesh::Mesh;
 pub(crate) use relief::{JUMP, Reliefs, TILE};
 
 /// The quantity that a map holds.
@@ -307,6 +309,20 @@ impl DepthMap {
         let (mut map, offset) = (self.clone(), self.offset as f32);
         map.data.iter_mut().for_each(|v| *v = change(*v).max(0.1 * *v - 0.9 * offset));
         map
+    }
+
+    /// Takes the depths of pixels away; how many of them were guesses, and how many far away.
+    pub(crate) fn forget(&mut self, pixels: &[bool]) -> (usize, usize) {
+        let (mut guesses, mut far) = (0, 0);
+        for p in (0..self.data.len()).filter(|p| pixels.get(*p) == Some(&true)) {
+            guesses += usize::from(self.is_guessed(p));
+            far += usize::from(self.measure == Measure::Depth && self.data[p] >= FAR);
+            self.data[p] = f32::NAN;
+            if let Some(origin) = self.origins.get_mut(p) {
+                *origin = Origin::Known;
+            }
+        }
+        (guesses, far)
     }
 
     /// Takes pixels as far away; the parallax of disparities is next to nothing there.

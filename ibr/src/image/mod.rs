@@ -12,8 +12,8 @@ mod write;
 pub mod y4m;
 
 pub use dynamic::Levels;
-pub(crate) use read::image_size;
 pub use read::{MOST_PIXELS, read_image, read_map};
+pub(crate) use read::{image_size, read_photograph};
 pub use texture::Texture;
 pub(crate) use write::write_file;
 pub use write::{encode, encode_with_alpha, save};
@@ -141,6 +141,12 @@ impl Image {
             (0..4).map(|i| across[i] * self.data[start + i * self.channels]).sum::<f32>()
         };
         (0..4).map(|k| down[k] * of_row(k)).sum()
+    }
+
+    /// The image after half a turn.
+    pub(crate) fn turned(&self) -> Self {
+        let data = self.data.chunks_exact(self.channels).rev().flatten().copied().collect();
+        Self { data, ..*self }
     }
 
     /// The same image with three channels.

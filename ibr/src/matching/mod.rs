@@ -73,15 +73,16 @@ struct Sweep<P> {
     range: Range<i32>,
 }
 
-/// Maps of photographs of one kind, unknown where no other photograph shows the point: disparities in pixels
-/// for a baseline of one, or depths in the unit of the cameras.
+/// Maps of the `wanted` ones of photographs of one kind, unknown where no other photograph shows the point:
+/// disparities in pixels for a baseline of one, or depths in the unit of the cameras.
 ///
 /// # Errors
 /// [`MatchError`].
 pub fn depths<P: Viewpoint>(
     photographs: &[Photograph<'_, P>],
     measure: Measure,
-) -> Result<Vec<DepthMap>, MatchError> {
+    wanted: &[bool],
+) -> Result<Vec<Option<DepthMap>>, MatchError> {
     let sweeps = |by| {
         let reduced = |p: &Photograph<'_, P>| (p.camera.reduced(by), p.image.to_grey().reduced(by));
         let sweep =
@@ -89,20 +90,28 @@ pub fn depths<P: Viewpoint>(
         let mut sweeps: Vec<_> = photographs.iter().map(reduced).map(sweep).collect();
         (0..sweeps.len()).try_for_each(|k| Sweep::prepare(&mut sweeps, k)).map(|()| sweeps)
     };
-    let coarse = matched(&sweeps(REDUCTION)?)?;
+    let coarse = matched(&sweeps(REDUCTION)?, &vec![true; wanted.len()])?;
     let mut fine = sweeps(1)?;
     fine.iter_mut().zip(&coarse).for_each(|(sweep, found)| sweep.narrow(found));
     let map = |(sweep, found): (&Sweep<P>, Vec<f32>)| {
-        let data = found.into_iter().map(|v| measure.of_parallax(v)).collect();
-        DepthMap::from_known(sweep.grey.size(), data, measure)
+        let data: Vec<f32> = found.into_iter().map(|v| measure.of_parallax(v)).collect();
+        (!data.is_empty()).then(|| DepthMap::from_known(sweep.grey.size(), data, measure))
     };
-    Ok(fine.iter().zip(matched(&fine)?).map(map).collect())
+    Ok(fine.iter().zip(matched(&fine, wanted)?).map(map).collect())
 }
 
-/// The parallaxes of all photographs, NaN where no other one has the same at the point.
-fn matched<P: Viewpoint>(sweeps: &[Sweep<P>]) -> Result<Vec<Vec<f32>>, MatchError> {
-    let found: Vec<Vec<f32>> = sweeps.iter().map(|sweep| sweep.parallaxes(sweeps)).collect();
+/// The parallaxes of the wanted photographs, NaN where no other one has the same at the point; those of the
+/// rest are empty.
+fn matched<P: Viewpoint>(sweeps: &[Sweep<P>], wanted: &[bool]) -> Result<Vec<Vec<f32>>, MatchError> {
+    let asked = |k: usize| {
+        wanted[k] || sweeps.iter().zip(wanted).any(|(sweep, wanted)| *wanted && sweep.others.contains(&k))
+    };
+    let of = |k: usize| if asked(k) { sweeps[k].parallaxes(sweeps) } else { Vec::new() };
+    let found: Vec<Vec<f32>> = (0..sweeps.len()).map(of).collect();
     let confirmed = (0..sweeps.len()).map(|k| {
+        if !wanted[k] {
+            return Ok(Vec::new());
+        }
         let values = sweeps[k].confirmed(sweeps, &found, k);
         let known = values.iter().filter(|v| !v.is_nan()).count();
         let is_alike = known as f64 > LEAST_SHARE * values.len() as f64;

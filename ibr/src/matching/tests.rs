@@ -8,6 +8,26 @@ fn cameras() -> [Camera; 3] {
     [0.0, 1.0, 2.0].map(|position| Camera::metric(rig_camera(position, SIZE), false).unwrap())
 }
 
+/// The maps of all photographs.
+fn depths<P: Viewpoint>(
+    photographs: &[Photograph<'_, P>],
+    measure: Measure,
+) -> Result<Vec<DepthMap>, MatchError> {
+    let found = super::depths(photographs, measure, &vec![true; photographs.len()])?;
+    Ok(found.into_iter().flatten().collect())
+}
+
+/// One that is wanted has the map that it has among all.
+#[test]
+fn the_map_of_one_photograph_is_found() {
+    let cameras = cameras();
+    let shots = cameras.map(|camera| SyntheticScene::default().view(&camera, SIZE));
+    let views = [0, 1, 2].map(|k| Photograph { image: &shots[k].0, camera: cameras[k] });
+    let one = super::depths(&views, Measure::Depth, &[false, true, false]).unwrap();
+    let all = depths(&views, Measure::Depth).unwrap();
+    assert!(one[0].is_none() && one[2].is_none() && one[1].as_ref() == Some(&all[1]));
+}
+
 /// Median of the differences of known values, and their share.
 fn errors(found: &DepthMap, truth: &DepthMap, measure: Measure) -> (f32, f64) {
     let values = found.data().iter().zip(truth.data()).filter(|(f, _)| !f.is_nan());

@@ -7,6 +7,7 @@ use crate::depth::{DepthMap, FAR, JUMP, Measure};
 use crate::image::Texture;
 use crate::propagate::{View, Viewpoint, nearest};
 use rayon::prelude::*;
+use std::fmt;
 
 /// Pixels of each view that are compared, about.
 const COMPARED_PIXELS: usize = 20_000;
@@ -46,6 +47,17 @@ impl PairAgreement {
     /// Whether so few points agree that the inputs are probably wrong.
     pub fn is_poor(&self) -> bool {
         self.share < LEAST_SHARE
+    }
+}
+
+impl fmt::Display for PairAgreement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ([first, second], percent) = (self.views.map(|view| view + 1), 100.0 * self.share);
+        let points = self.points;
+        write!(
+            f,
+            "views {first} and {second} agree in depth and colour at only {percent:.0} % of {points} points"
+        )
     }
 }
 

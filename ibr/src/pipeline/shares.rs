@@ -11,30 +11,31 @@ use crate::sample::Sample;
 /// alone.
 const REST: f64 = 1e-3;
 
-/// What the weight of the best sample about is raised to where only the rest shows a place: enough for the
-/// fit, and for what is continued into holes.
-const LEAST: f32 = 0.5;
+/// What the weight of the best sample about is raised to where only the rest shows a place, or where all depths
+/// are guesses: enough for the fit, which would smooth their texture away, and for what is continued into
+/// holes.
+const LEAST: f32 = 1.0;
 
 /// Shares of the views around a virtual camera.
-pub(super) struct Shares<'a> {
+pub(super) struct Shares {
     pub(super) nearness: Nearness,
-    pub(super) camera: &'a Camera,
+    pub(super) camera: Camera,
     /// Added to the columns of the samples.
     pub(super) offset: f64,
     pub(super) width: usize,
     /// The views that share in a point.
     pub(super) sharing: usize,
-    pub(super) view_weights: &'a ViewWeights,
+    pub(super) view_weights: ViewWeights,
 }
 
-impl Shares<'_> {
+impl Shares {
     /// How many views share in a point if so many are asked for.
     pub(super) fn sharing(asked: Option<usize>) -> usize {
         asked.unwrap_or(SHARING).min(SHARING)
     }
 
     /// The share of views in points, given by their places in the virtual view and their depths there.
-    pub(super) fn of_points(&self) -> impl FnMut(u16, [f64; 2], f32) -> f32 {
+    pub(super) fn of_points(&self) -> impl FnMut(u16, [f64; 2], f32) -> f32 + '_ {
         let (mut distances, mut sorted) = (Vec::new(), Vec::new());
         move |view, [x, y], depth| {
             let point = self.camera.unproject(x - self.offset, y, f64::from(depth));
@@ -67,7 +68,7 @@ impl Shares<'_> {
         let mut best = vec![0.0_f32; rows * self.width];
         for (s, factor) in samples.iter().zip(factors.iter()) {
             let cell = &mut best[(row(s) - top) * self.width + column(s)];
-            *cell = cell.max(*factor);
+            *cell = cell.max(s.weight * *factor);
         }
         for (s, factor) in samples.iter().zip(factors) {
             let (start, x) = ((row(s) - top) * self.width, column(s));

@@ -23,7 +23,7 @@ struct Suspicion<P> {
 }
 
 /// Cameras whose usual mistakes are known.
-pub(super) trait Suspected: Viewpoint {
+pub trait Suspected: Viewpoint {
     /// What else than the numbers of the maps and their order may be wrong.
     fn mistakes(views: &[SourceView<Self>]) -> Vec<(Vec<SourceView<Self>>, String)>;
 }
@@ -69,6 +69,12 @@ fn suspicions<P: Suspected>(views: &[SourceView<P>]) -> Vec<Suspicion<P>> {
             });
         }
     }
+    let turned = views.iter().map(|view| SourceView { image: view.image.turned(), ..view.clone() });
+    all.push(Suspicion {
+        views: turned.collect(),
+        said: "the photographs seem to be upside down, as where a program ignores how the camera was held (EXIF)"
+            .into(),
+    });
     all.extend(P::mistakes(views).into_iter().map(|(views, said)| Suspicion { views, said }));
     all
 }
@@ -174,6 +180,9 @@ mod tests {
         let mut inverse = views();
         inverse.iter_mut().for_each(|view| view.camera = view.camera.inverted().unwrap());
         assert!(named(&inverse).contains("map to the world"), "{}", named(&inverse));
+        let mut turned = views();
+        turned.iter_mut().for_each(|view| view.image = view.image.turned());
+        assert!(named(&turned).contains("upside down"), "{}", named(&turned));
         let mut zoomed = views();
         zoomed.iter_mut().for_each(|view| view.camera = view.camera.zoomed(2.0).unwrap());
         assert!(named(&zoomed).contains("twice too long"), "{}", named(&zoomed));

@@ -4,7 +4,7 @@
 use super::spec::{SceneSpec, TargetSpec, ViewSpec};
 use crate::camera::colmap::{PLACES, is_model, read_model};
 use crate::camera::transforms::read_transforms;
-use crate::camera::{Camera, CameraList, Frame};
+use crate::camera::{Camera, CameraError, CameraList, Frame};
 use crate::files::InputError;
 use crate::image::image_size;
 use hybank_core::messages::Quoted;
@@ -40,7 +40,8 @@ impl Described {
 }
 
 /// The scene of a folder, a `transforms.json` or the left and the right photograph of a rectified rig, for a
-/// file in the folder `beside`. Its virtual view is half-way between two views.
+/// file in the folder `beside`. Its virtual view is half-way between two views, or the place of the image
+/// `view`, which is no view then.
 ///
 /// ```
 /// use hybank_ibr::image::{Image, save};
@@ -51,7 +52,7 @@ impl Described {
 /// for path in &paths {
 ///     save(&Image::filled(8, 4, 1, 100.0), path)?;
 /// }
-/// let scene = describe(&paths, &folder)?;
+/// let scene = describe(&paths, None, &folder)?;
 /// assert_eq!((scene.spec.view.len(), scene.spec.targets[0].position), (2, Some(0.5)));
 /// assert!(scene.text()?.contains("image = \"left.png\""));
 /// # std::fs::remove_dir_all(folder)?;
@@ -60,8 +61,8 @@ impl Described {
 ///
 /// # Errors
 /// [`InputError`] of a file, or that there is no scene.
-pub fn describe(paths: &[PathBuf], beside: &Path) -> Found<Described> {
-    let writer = Writer { beside };
+pub fn describe(paths: &[PathBuf], view: Option<&str>, beside: &Path) -> Found<Described> {
+    let writer = Writer { beside, view };
     match paths {
         [folder] if folder.is_dir() => writer.of_folder(folder),
         [file] if file.extension().is_some_and(|ending| ending == "json") => writer.of_transforms(file),
@@ -78,6 +79,8 @@ pub fn describe(paths: &[PathBuf], beside: &Path) -> Found<Described> {
 /// Makes the scene of a file that stands in a folder.
 struct Writer<'a> {
     beside: &'a Path,
+    /// The image whose place is the virtual view.
+    view: Option<&'a str>,
 }
 
 /// An image with its camera, and what its `depth` says.
@@ -86,6 +89,14 @@ struct Placed<'a> {
     camera: Camera,
     image: PathBuf,
     depth: Option<PathBuf>,
+    mask: Option<PathBuf>,
+}
+
+/// What lies beside the cameras of a list: the photograph of a frame, its depth map and its mask.
+struct Files {
+    image: PathBuf,
+    depth: Option<PathBuf>,
+    mask: Option<PathBuf>,
 }
 
 impl Writer<'_> {
@@ -127,6 +138,10 @@ impl Writer<'_> {
     }
 
     fn of_pair(&self, photographs: [&Path; 2]) -> Found<Described> {
+        if let Some(view) = self.view {
+            let reason = "a rectified pair without one of its photographs shows no depth";
+            return Err(InputError::file(Path::new(view), reason));
+        }
         same_size(photographs)?;
         let mut spec = SceneSpec { targets: vec![TargetSpec::default()], ..SceneSpec::default() };
         spec.targets[0].position = Some(0.5);
@@ -154,7 +169,12 @@ impl Writer<'_> {
             let name = frame.image.to_string_lossy();
             let maps = above.join("stereo/depth_maps");
             let maps = ["geometric", "photometric"].map(|kind| maps.join(format!("{name}.{kind}.bin")));
-            (images.join(&frame.image), maps.into_iter().find(|map| map.is_file()))
+            let mask = above.join("masks").join(format!("{name}.png"));
+            Files {
+                image: images.join(&frame.image),
+                depth: maps.into_iter().find(|map| map.is_file()),
+                mask: mask.is_file().then_some(mask),
+            }
         })?;
         scene.spec.colmap = Some(self.path(model)?);
         Ok(scene)
@@ -164,28 +184,28 @@ impl Writer<'_> {
         let list = read_transforms(file)?;
         let beside = file.parent().unwrap_or(Path::new(""));
         let mut scene = self.of_list("Frames of transforms.json.", &list, |frame| {
-            (beside.join(&frame.image), frame.depth.as_ref().map(|depth| beside.join(depth)))
+            let [depth, mask] =
+                [&frame.depth, &frame.mask].map(|file| file.as_ref().map(|file| beside.join(file)));
+            Files { image: beside.join(&frame.image), depth, mask }
         })?;
         scene.spec.transforms = Some(self.path(file)?);
         Ok(scene)
     }
 
-    /// Views of general cameras; `files` are the photograph and the depth map of a frame.
-    fn of_list(
-        &self,
-        comment: &str,
-        list: &CameraList,
-        files: impl Fn(&Frame) -> (PathBuf, Option<PathBuf>),
-    ) -> Found<Described> {
+    /// Views of general cameras; `files` are those of a frame.
+    fn of_list(&self, comment: &str, list: &CameraList, files: impl Fn(&Frame) -> Files) -> Found<Described> {
         let mut there: Vec<Placed<'_>> = Vec::new();
         for frame in &list.frames {
-            let (image, depth) = files(frame);
+            let Files { image, depth, mask } = files(frame);
             if image.is_file() {
                 let fallback = if frame.has_size() { (0, 0) } else { image_size(&image)? };
                 let camera = list.camera(frame, fallback)?.camera;
-                there.push(Placed { frame, camera, image, depth });
+                there.push(Placed { frame, camera, image, depth, mask });
             }
         }
+        let place = self.view.map(|view| list.find(view)).transpose();
+        let place = place.map_err(|e| InputError::file(list.path(), e))?.map(|(frame, _)| frame);
+        there.retain(|placed| place.is_none_or(|place| !std::ptr::eq(placed.frame, place)));
         // With depth maps of some, those are enough.
         if there.iter().filter(|placed| placed.depth.is_some()).count() > 1 {
             there.retain(|placed| placed.depth.is_some());
@@ -194,23 +214,12 @@ impl Writer<'_> {
             let reason = format!("none of the {} photographs that it lists is there", list.frames.len());
             return Err(InputError::file(list.path(), reason));
         };
-        let apart = |placed: &&Placed<'_>, camera: &Camera| (placed.camera.centre() - camera.centre()).norm();
-        let others = there.iter().filter(|other| apart(other, &first.camera) > 0.0);
-        let by_distance =
-            |a: &&Placed<'_>, b: &&Placed<'_>, camera: &Camera| apart(a, camera).total_cmp(&apart(b, camera));
-        let second = others.min_by(|a, b| by_distance(a, b, &first.camera)).unwrap_or(first);
-        let camera = first
-            .camera
-            .towards(&second.camera, 0.5)
-            .map_err(|source| InputError::file(list.path(), format!("the virtual camera: {source}")))?;
-        let [one, other] = [first, second].map(|placed| Quoted(&placed.frame.image).to_string());
-        let mut comments = vec![comment.to_owned()];
-        comments.push(format!(
-            "The virtual camera is half-way between {one} and {other}; camera_of = \"..\" takes that of an image instead."
-        ));
-        let matrix = camera.matrix();
-        let rows = std::array::from_fn(|i| std::array::from_fn(|k| matrix[(i, k)]));
-        let target = TargetSpec { camera: Some(rows), ..TargetSpec::default() };
+        let (target, said) = match place {
+            Some(place) => at_place(place),
+            None => half_way(&there, first)
+                .map_err(|source| InputError::file(list.path(), format!("the virtual camera: {source}")))?,
+        };
+        let comments = vec![comment.to_owned(), said];
         let view = there.iter().map(|placed| self.view_of_camera(placed)).collect::<Found<_>>()?;
         let spec = SceneSpec { view, targets: vec![target], ..SceneSpec::default() };
         Ok(Described { spec, comments })
@@ -222,9 +231,31 @@ impl Writer<'_> {
             image: self.path(&placed.image)?,
             depth_scale: ViewSpec::usual_scale(&depth),
             depth: Some(depth),
+            mask: placed.mask.as_ref().map(|mask| self.path(mask)).transpose()?,
             ..ViewSpec::default()
         })
     }
+}
+
+/// The virtual view at the place of an image, and what a comment says of it.
+fn at_place(place: &Frame) -> (TargetSpec, String) {
+    let image = place.image.display().to_string();
+    let said = format!("The virtual camera is that of {}, which is no view.", Quoted(&image));
+    (TargetSpec { camera_of: Some(image), ..TargetSpec::default() }, said)
+}
+
+/// The virtual view between a view and the one nearest to it.
+fn half_way(there: &[Placed<'_>], first: &Placed<'_>) -> Result<(TargetSpec, String), CameraError> {
+    let apart = |placed: &Placed<'_>| (placed.camera.centre() - first.camera.centre()).norm();
+    let others = there.iter().filter(|other| apart(other) > 0.0);
+    let second = others.min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or(first);
+    let matrix = *first.camera.towards(&second.camera, 0.5)?.matrix();
+    let [one, other] = [first, second].map(|placed| Quoted(&placed.frame.image).to_string());
+    let said = format!(
+        "The virtual camera is half-way between {one} and {other}; camera_of = \"..\" takes that of an image instead."
+    );
+    let rows = std::array::from_fn(|i| std::array::from_fn(|k| matrix[(i, k)]));
+    Ok((TargetSpec { camera: Some(rows), ..TargetSpec::default() }, said))
 }
 
 /// The folder with `sparse` and `stereo` above a model.

@@ -12,9 +12,9 @@ mod uncalibrated;
 
 pub use complete::complete;
 pub use goals::MOST_FRAMES;
+pub(crate) use maps::photograph;
 
-use super::diagnosis::diagnosis;
-use super::prepare::{Preparation, prepare};
+use super::prepare::{Preparation, PrepareSettings, prepare};
 use super::spec::{KEYS, SceneSpec, ViewSpec};
 use super::unknown::Unknown;
 use super::{Kind, Scene};
@@ -116,6 +116,8 @@ struct Inputs {
     kind: Kind,
     /// Of each view its number among those that are not left out.
     numbers: Vec<usize>,
+    /// Of each view the pixels that show no part of the scene; empty if all do.
+    hidden: Vec<Vec<bool>>,
     /// What was decided, for the user.
     notes: Vec<String>,
 }
@@ -139,31 +141,22 @@ impl<'a> Loader<'a> {
             return Err(self.incomplete("there is no view to render from; add [[view]] tables"));
         }
         let goals = self.goals()?;
-        let Inputs { mut kind, numbers, mut notes } = if views.iter().any(|v| v.position.is_some()) {
+        let Inputs { mut kind, numbers, hidden, mut notes } = if views.iter().any(|v| v.position.is_some()) {
             self.rectified(&views, own.map(|(_, view)| view), &goals)?
         } else if views.iter().any(|v| v.camera.is_some() || self.source_of(v).is_some()) {
             self.calibrated(&views, left_out.as_ref(), &goals)?
         } else {
             self.uncalibrated(&views, own, &goals)?
         };
-        notes.extend(note_of_dark(&kind.images()));
-        notes.extend(match &kind {
-            Kind::Rectified { views, .. } => diagnosis(views),
-            Kind::Calibrated { views, .. } => diagnosis(views),
-            Kind::Uncalibrated { .. } => None,
-        });
         let unknown = self.options.unknown.or(self.spec.unknown).unwrap_or_default();
-        let keep = self.options.keep_cameras;
-        let Preparation { filled, far, outliers, misregistration } = match &mut kind {
-            Kind::Rectified { views, .. } => prepare(views, unknown, keep),
-            Kind::Calibrated { views, .. } => prepare(views, unknown, keep),
+        let settings = PrepareSettings { unknown, keep_cameras: self.options.keep_cameras, hidden: &hidden };
+        let prepared = match &mut kind {
+            Kind::Rectified { views, .. } => prepare(views, &settings),
+            Kind::Calibrated { views, .. } => prepare(views, &settings),
             Kind::Uncalibrated { .. } => Preparation::default(),
         };
-        notes.extend(
-            (far > 0).then(|| format!("{far} pixels without depth are taken as far away, like a sky")),
-        );
-        notes.extend(misregistration.map(note_of_misregistration));
-        notes.extend(note_of_outliers(&outliers));
+        notes.extend(prepared.notes);
+        let Preparation { filled, outliers, .. } = prepared;
         let names = numbers.iter().map(|number| views[*number].label()).collect();
         Ok(Scene { kind, names, offset: self.offset(&goals)?, filled, outliers, notes })
     }
@@ -223,45 +216,6 @@ impl<'a> Loader<'a> {
             ))
         })
     }
-}
-
-/// Largest value of 12 bits in 16 on the scale of 255, rounded up.
-const TWELVE_BITS: f32 = 16.0;
-
-/// That photographs are as dark as data of 12 bits in files of 16. Those of files of 8 bits have whole
-/// numbers.
-fn note_of_dark(images: &[&Image]) -> Option<String> {
-    let is_dark = |image: &Image| {
-        image.data().iter().all(|v| *v < TWELVE_BITS) && image.data().iter().any(|v| v.fract() != 0.0)
-    };
-    let dark: Vec<String> =
-        (1..).zip(images).filter(|(_, i)| is_dark(i)).map(|(k, _)| k.to_string()).collect();
-    (!dark.is_empty()).then(|| {
-        format!(
-            "no value of view {} is above a sixteenth of white; data of 12 bits in files of 16 must be multiplied by 16",
-            dark.join(", ")
-        )
-    })
-}
-
-fn note_of_misregistration(pixels: f64) -> String {
-    format!(
-        "the photographs were {pixels:.2} pixels beside each other; the cameras were corrected by so much"
-    )
-}
-
-/// Share of outliers from which on a report names them.
-const MANY_OUTLIERS: f64 = 0.005;
-
-fn note_of_outliers(shares: &[f64]) -> Option<String> {
-    let most = shares.iter().copied().fold(0.0, f64::max);
-    (most >= MANY_OUTLIERS).then(|| {
-        let percent: Vec<String> = shares.iter().map(|share| format!("{:.1}", 100.0 * share)).collect();
-        format!(
-            "{} % of the depths of the views contradict their neighbours, and other views do not outvote these; they were replaced",
-            percent.join(", ")
-        )
-    })
 }
 
 /// What `read` makes of each view, or the first error in the order of the views, so that every run reports

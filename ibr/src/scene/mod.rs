@@ -3,14 +3,16 @@
 mod diagnosis;
 mod folder;
 mod load;
+mod notes;
 mod prepare;
 mod register;
 mod spec;
 mod unknown;
 
 pub use folder::{Described, describe};
+pub(crate) use load::photograph;
 pub use load::{LoadOptions, MOST_FRAMES, complete, each_left_out, load, parse};
-pub use prepare::{Preparation, prepare};
+pub use prepare::{Preparation, PrepareSettings, prepare};
 pub use register::Registered;
 pub use spec::{SceneSpec, TargetSpec, ViewSpec};
 pub use unknown::Unknown;

@@ -2,10 +2,11 @@
 
 use crate::support::noise::noisy;
 use crate::support::normal::normal;
+use crate::support::render::of_rig;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, MOST_PIXELS, quality, read_image, read_map};
 use hybank_ibr::pipeline::uncalibrated::{Target, UncalibratedRendering, UncalibratedSettings};
-use hybank_ibr::pipeline::{Agreement, RenderSettings, rectified, uncalibrated};
+use hybank_ibr::pipeline::{Agreement, RenderSettings, uncalibrated};
 use hybank_ibr::propagate::RectifiedView;
 use hybank_ibr::restore::restore;
 use hybank_ibr::uncalibrated::Point;
@@ -44,7 +45,7 @@ fn views(pair: &Pair) -> [RectifiedView<'_>; 2] {
 
 fn psnr(pair: &Pair, settings: &RenderSettings) -> f64 {
     let start = std::time::Instant::now();
-    let got = rectified::render(&views(pair), 0.5, settings).unwrap();
+    let got = of_rig(&views(pair), 0.5, settings);
     let seconds = start.elapsed().as_secs_f64();
     let q = quality::compare(&got.image, pair.truth.as_ref().unwrap(), None).unwrap().unwrap();
     println!("{:.3} dB ssim {:.4} mae {:.3} {:?} {:.1} ms", q.psnr, q.ssim, q.mae, got.report, seconds * 1e3);
@@ -65,7 +66,7 @@ fn at_a_photographs_own_place() {
     for folder in ["cones", "teddy"] {
         let Some(pair) = pair(folder) else { return };
         for (place, own) in pair.images.iter().enumerate() {
-            let got = rectified::render(&views(&pair), place as f64, &RenderSettings::default()).unwrap();
+            let got = of_rig(&views(&pair), place as f64, &RenderSettings::default());
             let psnr = quality::compare(&got.image, own, None).unwrap().unwrap().psnr;
             println!("{folder} at view {place}: {psnr:.2} dB");
             assert!(psnr >= 40.7, "{folder} {place}: {psnr}");
@@ -118,7 +119,7 @@ fn single_views() {
     let Some(pair) = pair("teddy") else { return };
     for (place, least) in [23.1, 26.8].into_iter().enumerate() {
         let settings = RenderSettings::default();
-        let got = rectified::render(&views(&pair)[1 - place..2 - place], place as f64, &settings).unwrap();
+        let got = of_rig(&views(&pair)[1 - place..2 - place], place as f64, &settings);
         let psnr = quality::compare(&got.image, &pair.images[place], None).unwrap().unwrap().psnr;
         println!("teddy, view {place} from the other: {psnr:.2} dB");
         assert!(psnr >= least, "{place}: {psnr}");

@@ -4,15 +4,14 @@ mod uncalibrated;
 mod views;
 
 use crate::background;
-use crate::errors::{choose, refused};
+use crate::errors::{choose, refused, warn};
 use crate::results::Made;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::Measure;
 use hybank_ibr::interpolate::plane::PlaneSettings;
 use hybank_ibr::interpolate::{Cover, HoleFill};
-use hybank_ibr::pipeline::{RenderError, RenderSettings, Rendering, calibrated, rectified};
-use hybank_ibr::propagate::View;
-use hybank_ibr::scene::{Registered, SourceView, Unknown, prepare};
+use hybank_ibr::pipeline::{Geometry, RenderSettings, Renderer, Rendering};
+use hybank_ibr::scene::{PrepareSettings, Registered, SourceView, Unknown, prepare};
 use nalgebra::Matrix3x4;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
@@ -32,8 +31,8 @@ pub(crate) fn render_rectified<'py>(
     unknown: String,
 ) -> PyResult<Bound<'py, PyAny>> {
     let views = views(&images, &maps, positions, Measure::Disparity)?;
-    let settings = options.settings()?;
-    rendered(py, views, &unknown, options.keep_cameras, move |views| rectified::render(views, at, &settings))
+    let size = views.first().map_or((0, 0), |view| view.image.size());
+    rendered(py, views, &unknown, &options, at, size)
 }
 
 /// The view of `camera` with `size` (H, W), from images, depths and cameras (3, 4).
@@ -52,28 +51,32 @@ pub(crate) fn render_calibrated<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let cameras = cameras.iter().map(metric).collect::<PyResult<Vec<_>>>()?;
     let views = views(&images, &maps, cameras, Measure::Depth)?;
-    let (camera, settings) = (metric(&camera)?, options.settings()?);
-    rendered(py, views, &unknown, options.keep_cameras, move |views| {
-        calibrated::render(views, &camera, (size.1, size.0), &settings)
-    })
+    rendered(py, views, &unknown, &options, metric(&camera)?, (size.1, size.0))
 }
 
-/// The view that `render` makes of views once their depth and colours are restored.
-fn rendered<'py, P: Registered + 'static>(
+/// The view of a camera from views that are prepared first; what seems to be wrong with them is a warning.
+fn rendered<'py, P: Registered + Geometry + 'static>(
     py: Python<'py>,
     mut views: Vec<SourceView<P>>,
     unknown: &str,
-    keep_cameras: bool,
-    render: impl FnOnce(&[View<'_, P>]) -> Result<Rendering, RenderError> + Send + 'static,
+    options: &Options,
+    camera: P,
+    size: (usize, usize),
 ) -> PyResult<Bound<'py, PyAny>> {
     let kinds =
         [("auto", Unknown::Auto), ("far", Unknown::Far), ("fill", Unknown::Fill), ("drop", Unknown::Drop)];
-    let unknown = choose("unknown", unknown, &kinds)?;
+    let (unknown, settings) = (choose("unknown", unknown, &kinds)?, options.settings()?);
+    let keep_cameras = options.keep_cameras;
     let run = move |_: &_| {
-        prepare(&mut views, unknown, keep_cameras);
-        render(&views.iter().map(SourceView::view).collect::<Vec<_>>()).map_err(|e| e.to_string())
+        let prepared = prepare(&mut views, &PrepareSettings { unknown, keep_cameras, hidden: &[] });
+        let views: Vec<_> = views.iter().map(SourceView::view).collect();
+        let rendering = Renderer::new(&views, &settings).and_then(|r| r.render(&camera, size));
+        rendering.map(|rendering| (rendering, prepared.notes)).map_err(|e| e.to_string())
     };
-    made(py, &background::run(py, None, run)?.map_err(refused)?, None, None)
+    let (rendering, notes) = background::run(py, None, run)?.map_err(refused)?;
+    notes.iter().try_for_each(|note| warn(py, note))?;
+    rendering.agreement.pairs.iter().filter(|pair| pair.is_poor()).try_for_each(|pair| warn(py, pair))?;
+    made(py, &rendering, None, None)
 }
 
 /// How views are rendered, by the names of the command line.

@@ -4,13 +4,13 @@ use super::row_map::RowMap;
 use super::{CalibratedView, Frame, Tile};
 use crate::camera::Relative;
 use crate::depth::{Origin, Reliefs, TILE, or_far};
-use crate::occlusion::{Points, RUN};
+use crate::occlusion::{DepthTest, Points, RUN};
 use crate::propagate::{DOUBTFUL_WEIGHT, GUESSED_WEIGHT, spacing, weight};
 use crate::sample::Sample;
 
 /// The pixels of some tiles at their places in the virtual image, view by view and row by row.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Projected {
+pub struct Projected {
     points: Points,
     weights: Vec<f32>,
     doubtful: Vec<bool>,
@@ -40,6 +40,7 @@ impl Projected {
         tile: &Tile,
         frame: &Frame,
         own: (f64, f64),
+        test: &DepthTest,
     ) {
         let (row, column) = (tile.row as usize, tile.column as usize);
         let first_pixel = row * view.image.width() + column;
@@ -48,7 +49,7 @@ impl Projected {
         let mut depths = [f32::NAN; TILE];
         depths[..known.len()].copy_from_slice(known);
         let count = known.len().next_multiple_of(RUN);
-        let reliefs = view.map.reliefs(column, row);
+        let reliefs = view.map.reliefs(column, row, test);
         let mut places = Places::new(&RowMap::new(map, row), column, &depths, &reliefs, count);
         places.keep(frame, own, count);
         let (mut doubtful, mut origins) = (reliefs.behind_edge, [Origin::Known; TILE]);

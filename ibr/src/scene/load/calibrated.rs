@@ -10,6 +10,7 @@ use crate::files::InputError;
 use crate::image::{image_size, read_map};
 use crate::pipeline::calibrated::QUARTILES;
 use crate::pipeline::nearness::{AT_HAND, Placed, choose};
+use crate::scene::spec::MapSource;
 use crate::scene::{Kind, ViewSpec};
 use hybank_core::messages::Quoted;
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
@@ -82,11 +83,14 @@ impl Loader<'_> {
                 view,
                 Measure::Depth,
                 |_| Ok(*camera),
-                |image, camera| self.of_points(view, image, camera),
+                |source, image, camera| match source {
+                    MapSource::Mesh(file) => self.of_mesh(view, file, image, camera),
+                    _ => self.of_points(view, image, camera),
+                },
             )
         };
-        let views = self.matched(&views, each(&chosen, one)?, Measure::Depth)?;
-        Ok(Inputs { kind: Kind::Calibrated { views, cameras, size }, numbers, notes })
+        let (views, hidden) = self.whole(&views, each(&chosen, one)?, Measure::Depth)?;
+        Ok(Inputs { kind: Kind::Calibrated { views, cameras, size }, numbers, hidden, notes })
     }
 
     /// The numbers of the views that the virtual cameras need.
@@ -160,7 +164,9 @@ impl Loader<'_> {
     /// The virtual cameras and their size.
     fn cameras(&self, goals: &[Goal], first: First) -> Loaded<(Vec<Camera>, Size)> {
         let (_, listed) = self.start_of(&goals[0], first)?;
-        let size = self.size(goals, listed.map_or(first.size, |size| first.alike(size)))?;
+        let is_alike = goals[0].target.cameras.is_none();
+        let own = listed.map_or(first.size, |size| if is_alike { first.alike(size) } else { size });
+        let size = self.size(goals, own)?;
         let cameras = self.along(
             goals,
             |goal| self.scaled(self.start_of(goal, first)?, size, &goal.name),
@@ -235,13 +241,13 @@ impl Loader<'_> {
         if let Some(rows) = rows {
             return Ok((self.matrix(rows, &goal.name)?, None));
         }
-        match (image, self.common_source()) {
+        match (image, self.source_of_goal(goal)) {
             (Some(image), Some(source)) => {
                 let found = self.listed_camera(&source, image, first.size, &goal.name)?;
                 Ok((found.camera, Some(found.size)))
             }
             (Some(_), None) => Err(self.incomplete(format!(
-                "{} has `camera_of`, which needs a `colmap` folder or a `transforms` file at the top; give it a `camera` (3 x 4), or name that file",
+                "{} has `camera_of`, which needs `cameras`, or a `colmap` folder or a `transforms` file at the top; give it a `camera` (3 x 4), or name that file",
                 goal.name
             ))),
             (None, Some(source)) => Err(self.incomplete(format!(

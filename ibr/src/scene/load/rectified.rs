@@ -3,6 +3,8 @@
 use super::{Goal, Inputs, Loaded, Loader, each};
 use crate::depth::Measure;
 use crate::scene::{Kind, SourceView, ViewSpec};
+use hybank_core::messages::Quoted;
+use std::path::Path;
 
 impl Loader<'_> {
     pub(super) fn rectified(
@@ -20,12 +22,14 @@ impl Loader<'_> {
             let position = self.need(view.position, view, "position", "rectified")?;
             let position = self.finite(position, &view.named())?;
             let no_points = || {
+                let map = view.disparity.as_deref().unwrap_or(Path::new(""));
                 self.incomplete(format!(
-                    "{} has disparity = \"points\", which a rectified rig does not have; give it a map or \"matched\"",
-                    view.named()
+                    "{} has disparity = \"{}\", points of a world, which a rectified rig does not have; give it a map or \"matched\"",
+                    view.named(),
+                    Quoted(map)
                 ))
             };
-            self.read(view, Measure::Disparity, |_| Ok(position), |_, _| Err(no_points()))
+            self.read(view, Measure::Disparity, |_| Ok(position), |_, _, _| Err(no_points()))
         };
         let sources = each(views, one)?;
         let first = sources[0].image.size();
@@ -34,10 +38,10 @@ impl Loader<'_> {
         }
         self.no_other_size(goals, first)?;
         let is_matched = views.iter().any(|view| !view.is_stored());
-        let views = self.matched(views, sources, Measure::Disparity)?;
+        let (views, hidden) = self.whole(views, sources, Measure::Disparity)?;
         let notes = note_of_exchange(&views).filter(|_| is_matched).into_iter().collect();
         let numbers = (0..views.len()).collect();
-        Ok(Inputs { kind: Kind::Rectified { views, positions }, numbers, notes })
+        Ok(Inputs { kind: Kind::Rectified { views, positions }, numbers, hidden, notes })
     }
 
     /// A rectified virtual view is as large as the views.

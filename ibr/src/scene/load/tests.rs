@@ -194,7 +194,7 @@ fn what_is_wrong_is_named() {
         assert!(words.iter().all(|w| message.contains(w)), "{message}");
     };
     fails(&RIG.replace("disparity_scale", "disparity_scal"), &["scene.toml:7:5", "disparity_scal"]);
-    fails(&RIG.replacen("disparity = \"d.pgm\"", "", 1), &["\"left\"", "`disparity`"]);
+    fails(&RIG.replace("disparity = \"d.pgm\"", ""), &["\"left\"", "`disparity`"]);
     fails(&RIG.replacen("a.pgm", "missing.pgm", 1), &["missing.pgm"]);
     fails(&RIG.replacen("\"a.pgm\"", "\"small.pgm\"", 1), &["d.pgm", "4 x 2", "2 x 1"]);
     fails(&RIG.replace("d.pgm", "zero.pgm"), &["zero.pgm", "none of the 8 values"]);
@@ -225,6 +225,8 @@ fn what_is_wrong_is_named() {
 /// 12 bits in files of 16 are at most 4095 / 257, and dark photographs of 8 bits are no such data.
 #[test]
 fn data_of_twelve_bits_are_noticed() {
-    let noted = |values: [f32; 2]| note_of_dark(&[&Image::new(2, 1, 1, values.to_vec()).unwrap()]).is_some();
+    let noted = |values: [f32; 2]| {
+        crate::scene::notes::of_dark(&[&Image::new(2, 1, 1, values.to_vec()).unwrap()]).is_some()
+    };
     assert!(noted([15.9, 3.1]) && !noted([15.0, 3.0]) && !noted([16.1, 3.1]));
 }

@@ -38,7 +38,7 @@ impl Loader<'_> {
         let size = self.size(goals, own)?;
         let tracks = tracks.rows().iter().map(pick).collect();
         let kind = Kind::Uncalibrated { images, tracks, targets, size };
-        Ok(Inputs { kind, numbers: (0..views.len()).collect(), notes: Vec::new() })
+        Ok(Inputs { kind, numbers: (0..views.len()).collect(), hidden: Vec::new(), notes: Vec::new() })
     }
 
     /// What the goals ask for; `in_column` gives the positions in a column of the tracks.

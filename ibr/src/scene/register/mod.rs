@@ -5,10 +5,10 @@ mod poses;
 mod rows;
 
 use super::SourceView;
+use super::diagnosis::Suspected;
 use crate::camera::Camera;
 use crate::image::Image;
 use crate::pipeline::{DEVIATION_PER_MEDIAN, GREY_LEVELS, median};
-use crate::propagate::Viewpoint;
 
 /// Displacement in pixels below which nothing is corrected: the fit does not notice it.
 const LEAST: f64 = 0.05;
@@ -30,7 +30,7 @@ const DEVIATIONS: f64 = 4.0;
 const ROUNDED: f64 = 0.5;
 
 /// Cameras whose small errors are found from their photographs.
-pub trait Registered: Viewpoint {
+pub trait Registered: Suspected {
     /// Corrects the views; root mean square displacement that was taken out, in pixels.
     fn register(views: &mut [SourceView<Self>]) -> Option<f64>;
 }

@@ -2,6 +2,7 @@
 //! where the data are not there, and on scenes with exact references.
 
 use crate::ray_traced::scene;
+use crate::support::render::of_rig;
 use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use hybank_ibr::analysis::{Predictor, ViewError};
 use hybank_ibr::camera::Camera;
@@ -131,9 +132,7 @@ fn residual(views: &[RectifiedView<'_>], position: f64, image: &Image) -> Vec<f6
     if views.len() < 2 {
         return vec![0.0; image.width() * image.height()];
     }
-    let alone = |v: RectifiedView<'_>| {
-        hybank_ibr::pipeline::rectified::render(&[v], position, &RenderSettings::default()).unwrap().image
-    };
+    let alone = |v: RectifiedView<'_>| of_rig(&[v], position, &RenderSettings::default()).image;
     errors(&alone(views[0]), &alone(views[views.len() - 1]))
 }
 
@@ -265,8 +264,8 @@ fn scenes_with_exact_inputs() {
     let positions = [0.0, 1.0, 0.5];
     for (name, rig) in [("ray-traced", ray_traced(&positions)), ("synthetic", plain(&positions))] {
         let v = predict(name, &rig, &[0, 1], 0.5, &rig.images[2], 0.0);
-        // Rounding is most of it, and what the left-out views say of the rest is for twice the distance.
-        assert!((v.ratio - 1.0).abs() * v.measured < 0.25, "{name}: {v:?}");
+        // Views that are left out are rendered from one side, at twice the distance.
+        assert!((0.8..1.5).contains(&v.ratio), "{name}: {v:?}");
     }
 }
 

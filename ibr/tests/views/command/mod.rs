@@ -15,6 +15,7 @@ mod doors;
 mod evaluate;
 mod folders;
 mod foreign;
+mod inputs;
 mod mistakes;
 mod path;
 mod readme;
