@@ -34,6 +34,15 @@ def test_a_plane_between_two_rectified_views():
     np.testing.assert_allclose(colour.image[..., 0], view.image, atol=1e-3)
 
 
+def test_what_seems_to_be_wrong_is_a_warning():
+    images, disparity = [seen(0.0), seen(4.0)], [np.full((H, W), 4.0)] * 2
+    with pytest.warns(UserWarning, match="positions seem to be exchanged"):
+        hb.ibr.render(images, disparity=disparity, positions=[1.0, 0.0], at=0.5)
+    coarse = [np.full((H, W), 16.0)] * 2
+    with pytest.warns(UserWarning, match="disparities seem to be 4 times too large"):
+        hb.ibr.render(images, disparity=coarse, positions=[0.0, 1.0], at=0.5)
+
+
 def test_a_plane_between_two_calibrated_cameras():
     k = np.array([[80.0, 0, 20], [0, 80, 12], [0, 0, 1]])
     camera = lambda x: k @ np.hstack([np.eye(3), [[-x], [0], [0]]])  # noqa: E731

@@ -214,6 +214,19 @@ mod tests {
         assert!(worst < 1e-2, "{worst}");
     }
 
+    /// A frame of a film has the bits of a picture, whatever was rendered before.
+    #[test]
+    fn renderings_are_repeatable() {
+        let (image, depth) = scene();
+        let view = |c| CalibratedView { image: &image, map: &depth, camera: c };
+        let views = [view(camera(-0.3, 0.03)), view(camera(0.4, -0.04))];
+        let film = Renderer::new(&views, &RenderSettings::default()).unwrap();
+        let frames = [0.05, 0.2, 0.05].map(|x| film.render(&camera(x, 0.0), (40, 30)).unwrap());
+        assert!(frames[0] == frames[2] && frames[0] != frames[1]);
+        let alone = render(&views, &camera(0.2, 0.0), (40, 30), &RenderSettings::default()).unwrap();
+        assert!(alone == frames[1]);
+    }
+
     /// Where all depths are guesses the texture has the contrast that it has where they are known.
     #[test]
     fn texture_on_guessed_depth_keeps_its_contrast() {

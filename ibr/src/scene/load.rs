@@ -155,8 +155,8 @@ impl<'a> Loader<'a> {
             Kind::Calibrated { views, .. } => prepare(views, &settings),
             Kind::Uncalibrated { .. } => Preparation::default(),
         };
-        notes.extend(prepared.notes);
-        let Preparation { filled, outliers, .. } = prepared;
+        let Preparation { filled, outliers, faults, notes: changes, .. } = prepared;
+        notes.extend(faults.into_iter().chain(changes));
         let names = numbers.iter().map(|number| views[*number].label()).collect();
         Ok(Scene { kind, names, offset: self.offset(&goals)?, filled, outliers, notes })
     }

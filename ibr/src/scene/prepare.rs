@@ -27,7 +27,9 @@ pub struct Preparation {
     pub outliers: Vec<f64>,
     /// Root mean square displacement between the views that was corrected, in pixels.
     pub misregistration: Option<f64>,
-    /// What the user should know: what seems to be wrong with the views, and what was changed.
+    /// What seems to be wrong with the views.
+    pub faults: Vec<String>,
+    /// What was changed, in words.
     pub notes: Vec<String>,
 }
 
@@ -49,7 +51,7 @@ pub struct Preparation {
 /// ```
 pub fn prepare<P: Registered>(views: &mut [SourceView<P>], settings: &PrepareSettings<'_>) -> Preparation {
     let images: Vec<_> = views.iter().map(|view| &view.image).collect();
-    let mut notes: Vec<String> = notes::of_dark(&images).into_iter().chain(diagnosis(views)).collect();
+    let faults = notes::of_dark(&images).into_iter().chain(diagnosis(views)).collect();
     let mut far = make_dense(views, settings.unknown);
     // First, as errors of cameras look like noise of the maps.
     let misregistration = if settings.keep_cameras { None } else { P::register(views) };
@@ -61,10 +63,10 @@ pub fn prepare<P: Registered>(views: &mut [SourceView<P>], settings: &PrepareSet
         let (guesses, gone) = view.map.forget(hidden);
         (filled, far) = (filled.saturating_sub(guesses), far.saturating_sub(gone));
     }
-    notes.extend(notes::of_far(far));
-    notes.extend(misregistration.map(notes::of_misregistration));
-    notes.extend(notes::of_outliers(&outliers));
-    Preparation { filled, far, outliers, misregistration, notes }
+    let corrected = misregistration.map(notes::of_misregistration);
+    let notes =
+        [notes::of_far(far), corrected, notes::of_outliers(&outliers)].into_iter().flatten().collect();
+    Preparation { filled, far, outliers, misregistration, faults, notes }
 }
 
 /// Gives every pixel of the maps a value where that is wanted; how many are far away then.

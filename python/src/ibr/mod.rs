@@ -71,10 +71,10 @@ fn rendered<'py, P: Registered + Geometry + 'static>(
         let prepared = prepare(&mut views, &PrepareSettings { unknown, keep_cameras, hidden: &[] });
         let views: Vec<_> = views.iter().map(SourceView::view).collect();
         let rendering = Renderer::new(&views, &settings).and_then(|r| r.render(&camera, size));
-        rendering.map(|rendering| (rendering, prepared.notes)).map_err(|e| e.to_string())
+        rendering.map(|rendering| (rendering, prepared.faults)).map_err(|e| e.to_string())
     };
-    let (rendering, notes) = background::run(py, None, run)?.map_err(refused)?;
-    notes.iter().try_for_each(|note| warn(py, note))?;
+    let (rendering, faults) = background::run(py, None, run)?.map_err(refused)?;
+    faults.iter().try_for_each(|fault| warn(py, fault))?;
     rendering.agreement.pairs.iter().filter(|pair| pair.is_poor()).try_for_each(|pair| warn(py, pair))?;
     made(py, &rendering, None, None)
 }

@@ -190,7 +190,10 @@ impl Loader<'_> {
                 return Ok(None);
             }
             let none = |why: String| {
-                self.incomplete(format!("{} has no map, and the others show none from there{why}", view.named()))
+                self.incomplete(format!(
+                    "{} has no map, and the others show none from there{why}",
+                    view.named()
+                ))
             };
             let rendering = renderer.render(&read.camera, read.image.size());
             let depth = rendering.map_err(|e| none(format!(": {e}")))?.depth;
