@@ -1,6 +1,7 @@
 //! Scenes of general cameras: 3 x 4 matrices, COLMAP models or transforms files, and depths.
 
 use super::left_out::LeftOut;
+use super::maps::on_its_side;
 use super::{Goal, Inputs, Loaded, Loader, each};
 use crate::camera::Camera;
 use crate::camera::ListedCamera;
@@ -216,12 +217,13 @@ impl Loader<'_> {
         let ListedCamera { camera, size: from } = self.listed_camera(&source, &image, size, &which)?;
         if factors(from, size).is_none() {
             return Err(self.incomplete(format!(
-                "{which}: the image has {} x {} pixels, but {} lists its camera for {} x {}; use the image that was calibrated, or one that was resized by the same factor in both directions",
+                "{which}: the image has {} x {} pixels, but {} lists its camera for {} x {}; use the image that was calibrated, or one that was resized by the same factor in both directions{}",
                 size.0,
                 size.1,
                 Quoted(&source.path),
                 from.0,
-                from.1
+                from.1,
+                on_its_side(size, from)
             )));
         }
         let resized = (from != size).then_some(Resized { from, to: size });

@@ -2,6 +2,7 @@
 
 use super::{Loaded, Loader};
 use crate::camera::Camera;
+use crate::camera::resize::factors;
 use crate::depth::{DepthError, DepthMap, Measure};
 use crate::files::InputError;
 use crate::image::{Image, read_image, read_map, read_photograph};
@@ -39,6 +40,14 @@ impl<P: Copy> Read<P> {
         if (0..map.data().len()).any(is_shown) {
             map.forget(&self.hidden);
         }
+    }
+}
+
+/// What to say of a photograph whose shape is that of another image after a quarter turn.
+pub(super) fn on_its_side((width, height): (usize, usize), other: (usize, usize)) -> &'static str {
+    match width != height && factors((height, width), other).is_some() {
+        true => "; the photograph seems to lie on its side: turn its pixels as its EXIF data say",
+        false => "",
     }
 }
 
@@ -105,7 +114,10 @@ impl Loader<'_> {
         let map =
             DepthMap::new((width, height), stored, scale, measure).and_then(|map| with_offset(view, map));
         let fitting = map.and_then(|map| map.fits(image.size(), view.step.unwrap_or(1)).map(|()| map));
-        fitting.map_err(|e| InputError::file(&path, format!("{}: {e}", view.named())))
+        fitting.map_err(|e| {
+            let side = on_its_side(image.size(), (width, height));
+            InputError::file(&path, format!("{}: {e}{side}", view.named()))
+        })
     }
 
     /// Refuses what is said of the numbers of a file where no file has the map.

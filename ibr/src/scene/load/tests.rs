@@ -11,6 +11,7 @@ fn scene(text: &str) -> (tempfile::TempDir, PathBuf) {
     write("a.pgm", b"P5 4 2 255\n\x01\x02\x03\x04\x05\x06\x07\x08");
     write("small.pgm", b"P5 2 1 255\n\x01\x02");
     write("d.pgm", b"P5 4 2 255\n\x04\x04\x04\x00\x04\x04\x04\x04");
+    write("tall.pgm", b"P5 2 4 255\n\x04\x04\x04\x04\x04\x04\x04\x04");
     write("zero.pgm", b"P5 4 2 255\n\0\0\0\0\0\0\0\0");
     write("t.txt", b"1 2 3 4 5 6\n1 2 - 5 6\n");
     let path = dir.path().join("scene.toml");
@@ -197,6 +198,7 @@ fn what_is_wrong_is_named() {
     fails(&RIG.replace("disparity = \"d.pgm\"", ""), &["\"left\"", "`disparity`"]);
     fails(&RIG.replacen("a.pgm", "missing.pgm", 1), &["missing.pgm"]);
     fails(&RIG.replacen("\"a.pgm\"", "\"small.pgm\"", 1), &["d.pgm", "4 x 2", "2 x 1"]);
+    fails(&RIG.replacen("d.pgm", "tall.pgm", 1), &["tall.pgm", "2 x 4", "on its side"]);
     fails(&RIG.replace("d.pgm", "zero.pgm"), &["zero.pgm", "none of the 8 values"]);
     fails(&RIG.replace("4.0", "0.0"), &["the scale is 0"]);
     fails(&RIG.replace("[virtual]\n    position = 0.5", ""), &["[virtual] needs a `position`"]);

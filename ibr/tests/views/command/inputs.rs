@@ -176,7 +176,7 @@ fn a_view_without_a_map_takes_the_depths_of_the_others() {
     let all = psnr(dir.path(), &scene(&(view("a", true) + &view("b", true) + &view("c", true))));
     let two = psnr(dir.path(), &scene(&(view("b", true) + &view("c", true))));
     let lacking = psnr(dir.path(), &scene(&(view("a", false) + &view("b", true) + &view("c", true))));
-    assert!(lacking > all - 2.0 && lacking > two + 0.3, "{all} {lacking} {two}");
+    assert!(lacking > all - 3.5 && lacking > two + 3.0, "{all} {lacking} {two}");
     std::fs::write(dir.path().join("none.toml"), scene(&(view("a", false) + &view("b", false)))).unwrap();
     refused(dir.path(), &["render", "none.toml", "-o", "x.png"], 1, &["no `depth`", "\"matched\""]);
 }
