@@ -32,7 +32,8 @@ pub(super) fn examine<P: Geometry>(
         let displacement = ((shares + gain) / 2.0).sqrt();
         let slope = f64::from(slopes[p]) * displacement;
         // Samples of several views lie closer, and the error of a smooth texture is in proportion to their
-        // distance squared. The noise of the photograph that a view is compared with adds to that of the views.
+        // distance squared. The noise of the photograph that a view is compared with adds to that of the
+        // views.
         let (bend, noise) = (shares * f64::from(bends[p]), (1.0 + shares).sqrt());
         [bend, noise, slope, f64::from(jitter[p]), f64::from(edges[p]), 0.0]
     };

@@ -1,7 +1,7 @@
 //! Camera paths of nerfstudio's viewer (`camera_path.json`): virtual cameras without photographs.
 //!
-//! nerfstudio moves and scales the world before it trains. Where `dataparser_transforms.json`, which says how,
-//! lies beside the path, the cameras are taken back to the world of the photographs.
+//! nerfstudio moves and scales the world before it trains. Where `dataparser_transforms.json`, which says
+//! how, lies beside the path, the cameras are taken back to the world of the photographs.
 
 use super::list::{CameraList, Frame, Inner};
 use super::transforms::world_to_camera;

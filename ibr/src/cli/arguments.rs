@@ -138,8 +138,8 @@ pub(super) struct RenderArguments {
     /// cameras.
     #[arg(long, value_name = "K")]
     pub(super) nearest: Option<usize>,
-    /// Render the cameras of this file instead of [virtual]: a camera path of nerfstudio, a transforms.json or
-    /// the folder of a COLMAP model.
+    /// Render the cameras of this file instead of [virtual]: a camera path of nerfstudio, a transforms.json
+    /// or the folder of a COLMAP model.
     #[arg(long, value_name = "FILE")]
     pub(super) cameras: Option<PathBuf>,
     /// Bits per value of a PNG, 8 or 16.

@@ -152,7 +152,8 @@ mod tests {
         Camera::metric(matrix, false).unwrap()
     }
 
-    /// A floor that goes on behind the camera: its depth follows from the row, and above the horizon is nothing.
+    /// A floor that goes on behind the camera: its depth follows from the row, and above the horizon is
+    /// nothing.
     #[test]
     fn a_floor_is_cut_off_at_the_camera() {
         let corners = [[-900.0, 2.0, -50.0], [900.0, 2.0, -50.0], [0.0, 2.0, 900.0]].map(Vector3::from);

@@ -25,8 +25,8 @@ use crate::propagate::{View, Viewpoint};
 use crate::sample::{Dropped, Sample};
 use std::ops::Range;
 
-/// Renders virtual views of some photographs with maps. What the virtual camera does not change is found once:
-/// how the views agree, their noise, exposures and errors of depth.
+/// Renders virtual views of some photographs with maps. What the virtual camera does not change is found
+/// once: how the views agree, their noise, exposures and errors of depth.
 ///
 /// ```
 /// use hybank_ibr::depth::{DepthMap, Measure};

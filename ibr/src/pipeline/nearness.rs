@@ -77,8 +77,8 @@ impl Nearness {
     }
 }
 
-/// The angle of a cosine, too small by a thousandth at a right angle. Every sample asks for one per view, and
-/// the function of the library takes a tenth of a film.
+/// The angle of a cosine, too small by two thousandths at a right angle. Every sample asks for one per view,
+/// and the function of the library takes a twentieth of a film.
 #[inline]
 fn angle(cosine: f64) -> f64 {
     // The sine of half the angle, squared, and the series of its inverse.

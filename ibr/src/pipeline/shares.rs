@@ -11,9 +11,9 @@ use crate::sample::Sample;
 /// alone.
 const REST: f64 = 1e-3;
 
-/// What the weight of the best sample about is raised to where only the rest shows a place, or where all depths
-/// are guesses: enough for the fit, which would smooth their texture away, and for what is continued into
-/// holes.
+/// What the weight of the best sample about is raised to where only the rest shows a place, or where all
+/// samples are doubtful or guesses: enough for the fit, which would smooth their texture away, and for what
+/// is continued into holes. With 1 in its place views of 24 cameras on an arc lost up to 0.1 dB.
 const LEAST: f32 = 0.5;
 
 /// Shares of the views around a virtual camera.
@@ -68,8 +68,7 @@ impl Shares {
         let mut best = vec![0.0_f32; rows * self.width];
         for (s, factor) in samples.iter().zip(factors.iter()) {
             let cell = &mut best[(row(s) - top) * self.width + column(s)];
-            let trust = if s.origin.is_guess() { s.weight } else { 1.0 };
-            *cell = cell.max(trust * *factor);
+            *cell = cell.max(s.weight * *factor);
         }
         for (s, factor) in samples.iter().zip(factors) {
             let (start, x) = ((row(s) - top) * self.width, column(s));
