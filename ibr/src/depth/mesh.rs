@@ -214,6 +214,8 @@ mod tests {
             assert!(ply::decode(&bytes[..bytes.len() - 1]).unwrap_err().contains("face 0 of 1"));
         }
         assert!(ply::decode(b"obj").unwrap_err().contains("no PLY"));
+        let empty = "ply\nformat ascii 1.0\nelement vertex 99999999999\nend_header\n";
+        assert!(ply::decode(empty.as_bytes()).unwrap_err().contains("has no property"));
         let beyond = text.replace("3 0 1 2", "3 0 1 9");
         assert!(ply::decode(beyond.as_bytes()).unwrap_err().contains("corner 9"));
     }
