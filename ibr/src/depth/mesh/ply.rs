@@ -154,8 +154,7 @@ fn elements(header: &str) -> Result<Vec<Element>, String> {
         elements.last_mut().ok_or("a property stands before all elements")?.properties.push(property);
     }
     // Nothing would end a long list of them.
-    match elements.iter().find(|element| element.properties.is_empty() && element.count > 0) {
-        Some(element) => Err(format!("element \"{}\" has no property", Quoted(&element.name))),
-        None => Ok(elements),
-    }
+    let empty = elements.iter().find(|element| element.properties.is_empty() && element.count > 0);
+    let empty = empty.map(|element| format!("element \"{}\" has no property", Quoted(&element.name)));
+    empty.map_or(Ok(elements), Err)
 }
