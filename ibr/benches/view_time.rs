@@ -7,16 +7,18 @@
 
 #[path = "../../benches/stopwatch/mod.rs"]
 mod stopwatch;
+#[path = "../examples/demo/synthetic.rs"]
+mod synthetic;
 
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::DepthMap;
 use hybank_ibr::image::Image;
 use hybank_ibr::interpolate::plane::PlaneSettings;
 use hybank_ibr::partial::densify;
-use hybank_ibr::pipeline::{Method, RenderSettings, calibrated, rectified};
+use hybank_ibr::pipeline::{RenderSettings, Renderer};
 use hybank_ibr::propagate::{CalibratedView, RectifiedView};
-use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use stopwatch::time;
+use synthetic::{SyntheticScene, rig_camera, rig_disparity};
 
 struct View {
     image: Image,
@@ -60,8 +62,10 @@ fn full_depth(size: (usize, usize), positions: &[f64]) {
         .iter()
         .map(|v| RectifiedView { image: &v.image, map: &v.disparity, camera: v.position })
         .collect();
-    let settings = RenderSettings { method: Method::Rows, ..RenderSettings::default() };
-    time_chosen(&name("rows"), || rectified::render(&rows, 0.5, &settings).expect("the views overlap"));
+    let settings = RenderSettings::default();
+    time_chosen(&name("rows"), || {
+        Renderer::new(&rows, &settings).and_then(|rows| rows.render(&0.5, size)).expect("the views overlap")
+    });
     let free: Vec<CalibratedView<'_>> =
         views.iter().map(|v| CalibratedView { image: &v.image, map: &v.depth, camera: v.camera }).collect();
     let target = Camera::metric(rig_camera(0.5, size), false).expect("a rig camera is regular");
@@ -69,7 +73,7 @@ fn full_depth(size: (usize, usize), positions: &[f64]) {
         let mut settings = RenderSettings::default();
         settings.interpolation.plane = plane;
         time_chosen(&name(method), || {
-            calibrated::render(&free, &target, size, &settings).expect("they overlap")
+            Renderer::new(&free, &settings).and_then(|free| free.render(&target, size)).expect("they overlap")
         });
     }
 }

@@ -1,6 +1,10 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+// The synthetic scene names this crate as an example does.
+#[cfg(test)]
+extern crate self as hybank_ibr;
+
 pub mod analysis;
 pub mod camera;
 pub mod cli;
@@ -18,5 +22,7 @@ pub mod restore;
 pub mod sample;
 pub mod scene;
 pub mod setting;
-pub mod synthetic;
+#[cfg(test)]
+#[path = "../examples/demo/synthetic.rs"]
+mod synthetic;
 pub mod uncalibrated;

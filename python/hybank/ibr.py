@@ -27,14 +27,12 @@ def render(
     max_pixels=MOST_PIXELS,
     offset=0.0,
     nearest=None,
-    method="auto",
     degree=None,
-    lambda_=None,
     fill="background",
-    drop_unknown=False,
+    unknown="auto",
     keep_exposure=False,
+    keep_cameras=False,
     seed=None,
-    reverse_order=False,
 ):
     """Render the view of a virtual camera from views with depth.
 
@@ -69,23 +67,19 @@ def render(
         Added to every column of the view, in pixels.
     nearest : int, optional
         Use only so many views, those nearest to the virtual camera.
-    method : {"auto", "rows", "plane"}
-        How samples are interpolated: by a spline for each row of a rectified rig, or by one for the whole image; "auto"
-        takes rows where it can.
     degree : {"cubic", "linear"}, optional
-        Degree of the splines of the plane; cubic if left out.
-    lambda_ : float, optional
-        Weight of the slope penalty of the row fit, px^2; from the noise of the images if left out.
+        Degree of the splines for general cameras; cubic if left out.
     fill : {"background", "bridge", "leave"}
         Continue the farther side into holes, bridge them by the spline, or leave them black.
-    drop_unknown : bool
-        Drop pixels of unknown depth instead of filling it from the farther neighbour.
+    unknown : {"auto", "far", "fill", "drop"}
+        What unknown depths are taken for: far away where they look like a sky and filled elsewhere, or all far away,
+        filled from the farther neighbour, or left out.
     keep_exposure : bool
         Use the brightness of every image as it is, instead of giving all the exposure of the first.
+    keep_cameras : bool
+        Do not correct the cameras, or the rows of a rig, where the images do not fit each other.
     seed : int, optional
         Seed of the robust estimators for views without cameras; 1 if left out.
-    reverse_order : bool
-        Take the other order of depth, where a ``UserWarning`` says that it is undecided.
 
     Returns
     -------
@@ -108,31 +102,28 @@ def render(
             "give disparity, positions and at of a rectified rig, or depth, cameras and camera of another one, or tracks"
             " and either points or at of views without cameras"
         )
-    in_rows = rectified and method != "plane"
     for name, value, needs, has_use in [
         ("seed", seed, "views without cameras", uncalibrated),
-        ("reverse_order", reverse_order or None, "views without cameras", uncalibrated),
-        ("degree", degree, "views with cameras", not uncalibrated),
+        ("degree", degree, "views of general cameras", calibrated),
         ("nearest", nearest, "views with cameras", not uncalibrated),
-        ("lambda_", lambda_, "the row fit, so a rectified rig and the method rows", in_rows),
     ]:
         if value is not None and not has_use:
             raise HybankError(f"{name}: it is for {needs}; leave it out of this rendering")
     options = {
-        "method": method, "fill": fill, "degree": degree, "lambda": lambda_, "offset": float(offset), "nearest": nearest,
-        "keep_exposure": bool(keep_exposure),
+        "fill": fill, "degree": degree, "offset": float(offset), "nearest": nearest, "keep_exposure": bool(keep_exposure),
+        "keep_cameras": bool(keep_cameras),
     }
     size = _size(images, None if rectified else size, max_pixels)
     if rectified:
         maps = _maps(images, disparity, "disparity", positions, "positions")
-        return render_rectified(images, maps, [float(p) for p in positions], float(at), options, not drop_unknown)
+        return render_rectified(images, maps, [float(p) for p in positions], float(at), options, unknown)
     if calibrated:
         maps = _maps(images, depth, "depth", cameras, "cameras")
         matrices = [_camera(matrix) for matrix in cameras]
-        return render_calibrated(images, maps, matrices, _camera(camera), size, options, not drop_unknown)
+        return render_calibrated(images, maps, matrices, _camera(camera), size, options, unknown)
     tracks, points = _tracks(tracks, points, len(images))
     at = 0.0 if at is None else float(at)
-    return render_uncalibrated(images, tracks, points, at, size, options, seed, bool(reverse_order))
+    return render_uncalibrated(images, tracks, points, at, size, options, seed)
 
 
 def _size(images, size, most):

@@ -13,6 +13,8 @@ mod flat;
 mod page;
 mod scanlines;
 mod spatial;
+#[path = "../demo/synthetic.rs"]
+mod synthetic;
 mod tables;
 mod theory;
 

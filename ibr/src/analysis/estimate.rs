@@ -2,29 +2,26 @@
 
 use super::Cause;
 use super::calibrate::LeastSquares;
+use super::examine::{examine, spacing};
 use super::regressors::{CAUSE_OF, REGRESSORS, Regressors, difference};
 use super::variogram::Variogram;
-use crate::image::Image;
-use crate::pipeline::{RenderError, RenderSettings, Rendering};
-use crate::propagate::{View, Viewpoint};
+use crate::pipeline::{Geometry, RenderError, RenderSettings, Rendering};
+use crate::propagate::View;
 use std::ops::Range;
 
-/// Weights of the mean absolute error for photographs, from "Cones": bias, noise, slope, jitter, edge,
-/// doubt, hole.
-const TYPICAL: Regressors = [0.9, 2.3, 0.12, 1.0, 0.08, 0.5, 1.2];
+/// Weights of the mean absolute error for photographs, from "Cones" and "Teddy": bend, noise, slope, jitter,
+/// edge, hole.
+const TYPICAL: Regressors = [0.9, 1.6, 0.12, 1.0, 0.08, 1.2];
 
 /// Weights of the mean square: those of a normal error of that mean, with heavier tails where the depth is
 /// in doubt.
-const TYPICAL_SQUARE: Regressors = [1.5, 9.0, 0.03, 1.6, 0.1, 1.5, 3.0];
+const TYPICAL_SQUARE: Regressors = [1.5, 9.0, 0.03, 1.6, 0.1, 3.0];
 
 /// Views that are left out, at most; each costs a rendering.
 const LEFT_OUT: usize = 4;
 
 /// A prior as strong as this many grey levels squared per pixel.
 const PRIOR: f64 = 1e-3;
-
-/// Error of two values that are both rounded.
-const ROUNDING: f32 = 1.0;
 
 /// The weights of the causes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,9 +40,7 @@ pub struct Calibration {
 pub struct ViewError {
     /// The rendering.
     pub rendering: Rendering,
-    /// Local limit of each pixel, in grey levels, row by row: not sure, see [the module](super).
-    pub local_limit: Vec<f32>,
-    /// Expected bound: the root mean square.
+    /// Expected bound: the root mean square, in grey levels, row by row.
     pub expected: Vec<f32>,
     /// Expected absolute error.
     pub estimate: Vec<f32>,
@@ -58,8 +53,6 @@ pub struct ViewError {
 /// Figures of a whole view, in grey levels unless named.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Totals {
-    /// Mean of the local limits.
-    pub local_limit: f64,
     /// Root mean square: the expected bound of the mean absolute error.
     pub expected: f64,
     /// Mean absolute error.
@@ -86,19 +79,10 @@ impl ViewError {
         };
         let square = mean(&self.expected[pixels.clone()], 2);
         Totals {
-            local_limit: mean(&self.local_limit[pixels.clone()], 1),
             expected: square.sqrt(),
             estimate: mean(&self.estimate[pixels], 1),
             psnr: 10.0 * (255.0 * 255.0 / square).log10(),
         }
-    }
-
-    /// Share of the pixels whose error against a photograph of the same size is within the local limit,
-    /// after rounding to 8 bits.
-    pub fn within_local_limit(&self, truth: &Image) -> f64 {
-        let errors = difference(&self.rendering.image.quantised(), truth);
-        let pairs = errors.iter().zip(&self.local_limit);
-        pairs.filter(|(error, limit)| **error <= **limit + ROUNDING).count() as f64 / errors.len() as f64
     }
 
     /// The cause of the largest part of the estimate.
@@ -108,31 +92,8 @@ impl ViewError {
     }
 }
 
-/// What differs between the predictions for rectified rigs and for general cameras.
-pub trait Predicted: Viewpoint {
-    /// The view of this camera with `size` pixels; that of a rectified rig has the size of the photographs.
-    fn render(
-        &self,
-        views: &[View<'_, Self>],
-        size: (usize, usize),
-        settings: &RenderSettings,
-    ) -> Result<Rendering, RenderError>;
-
-    /// The view of this camera with the regressors of its pixels; neighbouring views are `spacing` apart.
-    fn examine(
-        &self,
-        views: &[View<'_, Self>],
-        size: (usize, usize),
-        study: &Study,
-        spacing: f64,
-    ) -> Result<Examined, RenderError>;
-
-    /// Mean distance between neighbouring views; of views at one point that from this camera, or one.
-    fn spacing(&self, views: &[View<'_, Self>]) -> f64;
-}
-
 /// What renderings are examined with.
-pub struct Study {
+pub(super) struct Study {
     pub(super) settings: RenderSettings,
     pub(super) variogram: Variogram,
     /// Standard deviation of the errors of disparity, or of the relative errors of depth.
@@ -140,13 +101,13 @@ pub struct Study {
 }
 
 /// What is found of a rendering before its causes are weighed.
-pub struct Examined {
+pub(super) struct Examined {
     pub(super) rendering: Rendering,
     pub(super) regressors: Vec<Regressors>,
 }
 
 /// Expected error, estimate and causes from the regressors and their weights.
-pub(super) fn judge(examined: Examined, local_limit: Vec<f32>, calibration: Calibration) -> ViewError {
+pub(super) fn judge(examined: Examined, calibration: Calibration) -> ViewError {
     let Examined { rendering, regressors } = examined;
     let mut causes = [0.0; 5];
     let (mut expected, mut estimate) = (Vec::new(), Vec::new());
@@ -160,19 +121,19 @@ pub(super) fn judge(examined: Examined, local_limit: Vec<f32>, calibration: Cali
         estimate.push(mean as f32);
         expected.push(squares.sqrt().max(mean) as f32);
     }
-    ViewError { rendering, local_limit, expected, estimate, causes, calibration }
+    ViewError { rendering, expected, estimate, causes, calibration }
 }
 
 impl Calibration {
     /// Leaves views out in turn, renders them from the others and explains the errors by the causes.
-    pub(super) fn of<P: Predicted>(views: &[View<'_, P>], study: &Study) -> Result<Self, RenderError> {
+    pub(super) fn of<P: Geometry>(views: &[View<'_, P>], study: &Study) -> Result<Self, RenderError> {
         let (mut absolute, mut square) = (LeastSquares::default(), LeastSquares::default());
         let used = if views.len() < 2 { 0 } else { views.len().min(LEFT_OUT) };
         for k in 0..used {
             let mut others = views.to_vec();
             let truth = others.remove(k * views.len() / used);
-            let spacing = truth.camera.spacing(views);
-            let examined = truth.camera.examine(&others, truth.image.size(), study, spacing)?;
+            let spacing = spacing(views, &truth.camera);
+            let examined = examine(&others, &truth.camera, truth.image.size(), study, spacing)?;
             let errors = difference(&examined.rendering.image.quantised(), truth.image);
             for (x, error) in examined.regressors.iter().zip(errors) {
                 absolute.add(x, f64::from(error));

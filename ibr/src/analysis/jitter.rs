@@ -1,11 +1,10 @@
 //! What errors of depth change in a view: it is rendered once more from depths with such errors.
 
-use super::estimate::Predicted;
 use super::regressors::{difference, local_mean};
 use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::pipeline::depth_errors::Lookups;
-use crate::pipeline::{RenderError, RenderSettings};
+use crate::pipeline::{Geometry, RenderError, RenderSettings, Renderer};
 use crate::propagate::{View, Viewpoint, nearest};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -51,7 +50,7 @@ pub fn with_noise<P>(views: &[View<'_, P>], deviation: f64, seed: u64) -> Vec<De
 ///
 /// # Errors
 /// Those of [`crate::pipeline`].
-pub fn depth_jitter<P: Predicted>(
+pub fn depth_jitter<P: Geometry>(
     views: &[View<'_, P>],
     camera: &P,
     settings: &RenderSettings,
@@ -64,6 +63,6 @@ pub fn depth_jitter<P: Predicted>(
     }
     let maps = with_noise(views, deviation, 1);
     let noisy: Vec<_> = views.iter().zip(&maps).map(|(v, map)| View { map, ..*v }).collect();
-    let changed = camera.render(&noisy, view.size(), settings)?.image;
+    let changed = Renderer::new(&noisy, settings)?.render(camera, view.size())?.image;
     Ok(local_mean(&difference(&changed, view), view.size()))
 }

@@ -2,59 +2,47 @@
 //!
 //! Numbers for each pixel, in grey levels:
 //!
-//! * **local limit**: what the error does not exceed where slopes, second differences and residuals are at
-//!   most those of the photographs nearby. It is not sure: photographs break it where surfaces reflect,
-//!   where depth is wrong in all views, and where something lies between the samples;
 //! * **expected**: the root of the expected square. By Jensen's inequality the expected error is not larger;
 //! * **estimate**: the expected absolute error against a photograph from the place of the virtual camera.
 //!
-//! The local limit has the form of that of linear interpolation, (1/8) |f''| D^2 + E_T + E_D B |f'|, with
-//! residuals, slopes and second differences of the photographs nearby (`lookup.rs`).
-//!
-//! The other two are sums over causes. The size of each cause is computed: the bias of the fit, by
-//! fitting the fit once more (`rows.rs`); the views that share in a pixel; the slope; the change under
-//! errors of depth as large as the maps' disagreement; depth edges nearby; doubtful depths; holes, by the
-//! variogram of the photographs. The weights of the causes are calibrated on the inputs themselves:
-//! each view is left out in turn and rendered from the others, and its photograph is the truth. A single
-//! view cannot be left out; it takes the weights of typical photographs.
+//! Both are sums over causes. The size of each cause is computed: the bends of the view, which the fit
+//! smooths; the views that share in a pixel; the slope; the change under errors of depth as large as the
+//! maps' disagreement; depth edges nearby; holes, by the variogram of the photographs. The weights of the
+//! causes are calibrated on the inputs themselves: each view is left out in turn and rendered from the
+//! others, and its photograph is the truth. A single view cannot be left out; it takes the weights of
+//! typical photographs.
 //!
 //! ```
 //! use hybank_ibr::analysis::Predictor;
-//! use hybank_ibr::camera::Camera;
+//! use hybank_ibr::depth::{DepthMap, Measure};
+//! use hybank_ibr::image::Image;
 //! use hybank_ibr::pipeline::RenderSettings;
 //! use hybank_ibr::propagate::RectifiedView;
-//! use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
-//! let (size, settings) = ((64, 32), RenderSettings::default());
-//! let shots = [0.0, 1.0].map(|position| {
-//!     let camera = Camera::metric(rig_camera(position, size), false).expect("a pinhole camera");
-//!     let (image, depth) = SyntheticScene::default().view(&camera, size);
-//!     (image, rig_disparity(&depth, size.0), position)
-//! });
-//! let views = shots.each_ref().map(|(image, map, camera)| RectifiedView { image, map, camera: *camera });
+//! // A textured wall four pixels of disparity away.
+//! let size = (64, 32);
+//! let texture = |x: usize, y: usize| 120.0 + 60.0 * (0.7 * x as f32).sin() + 30.0 * (0.4 * y as f32).cos();
+//! let shot = |shift: usize| (0..64 * 32).map(|p| texture(p % 64 + shift, p / 64)).collect();
+//! let images = [Image::new(64, 32, 1, shot(0))?, Image::new(64, 32, 1, shot(4))?];
+//! let map = DepthMap::new(size, vec![4.0; 64 * 32], 1.0, Measure::Disparity)?;
+//! let views = [0, 1].map(|k| RectifiedView { image: &images[k], map: &map, camera: k as f64 });
 //! // The view half-way, its error, and what makes it smaller.
-//! let predictor = Predictor::new(&views, &settings)?;
-//! let view = predictor.at(&0.5, size)?;
-//! assert!((0.1..20.0).contains(&view.totals().estimate));
+//! let view = Predictor::new(&views, &RenderSettings::default())?.at(&0.5, size)?;
+//! assert!(view.totals().estimate < 20.0);
 //! println!("{}", view.dominant().remedy());
-//! # Ok::<(), hybank_ibr::pipeline::RenderError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod calibrate;
-mod choice;
 mod estimate;
-mod general;
+mod examine;
 mod jitter;
-mod lookup;
 mod predictor;
 mod regressors;
-mod rows;
 mod variogram;
 
-pub use choice::Choice;
-pub use estimate::{Calibration, Predicted, Totals, ViewError};
+pub use estimate::{Calibration, Totals, ViewError};
 pub use jitter::{depth_jitter, with_noise};
 pub use predictor::Predictor;
-pub(crate) use regressors::difference;
 
 /// What an error comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

@@ -1,12 +1,12 @@
 //! The error of any number of views, with weights that are calibrated once.
 
-use super::estimate::{Calibration, Predicted, Study, ViewError, judge};
+use super::estimate::{Calibration, Study, ViewError, judge};
+use super::examine::{examine, spacing};
 use super::jitter::map_noise;
-use super::lookup::local_limits;
 use super::variogram::Variogram;
 use crate::depth::DepthMap;
 use crate::image::Image;
-use crate::pipeline::{Agreement, Exposure, RenderError, RenderSettings, without_drift};
+use crate::pipeline::{Agreement, Exposure, Geometry, RenderError, RenderSettings, without_drift};
 use crate::propagate::View;
 
 /// Views with the weights that are calibrated on them, for any number of predictions.
@@ -19,7 +19,7 @@ pub struct Predictor<'a, P> {
     agreement: Agreement,
 }
 
-impl<'a, P: Predicted> Predictor<'a, P> {
+impl<'a, P: Geometry> Predictor<'a, P> {
     /// Leaves each view out in turn and calibrates.
     ///
     /// # Errors
@@ -60,9 +60,8 @@ impl<'a, P: Predicted> Predictor<'a, P> {
     /// Those of [`crate::pipeline`].
     pub fn at(&self, camera: &P, size: (usize, usize)) -> Result<ViewError, RenderError> {
         let views = self.views();
-        let examined = camera.examine(&views, size, &self.study, camera.spacing(&views))?;
-        let local_limit = local_limits(&views, camera, &examined.rendering, self.study.noise);
-        Ok(judge(examined, local_limit, self.calibration))
+        let examined = examine(&views, camera, size, &self.study, spacing(&views, camera))?;
+        Ok(judge(examined, self.calibration))
     }
 
     /// The mean estimate of the view of `camera` from some of the views, or from others.
@@ -76,7 +75,7 @@ impl<'a, P: Predicted> Predictor<'a, P> {
         camera: &P,
         size: (usize, usize),
     ) -> Result<f64, RenderError> {
-        let examined = camera.examine(views, size, &self.study, camera.spacing(&self.views()))?;
+        let examined = examine(views, camera, size, &self.study, spacing(&self.views(), camera))?;
         Ok(self.calibration.mean(&examined.regressors))
     }
 }

@@ -7,14 +7,14 @@ use crate::interpolate::Cover;
 use crate::pipeline::Rendering;
 
 /// Number of regressors.
-pub(super) const REGRESSORS: usize = 7;
+pub(super) const REGRESSORS: usize = 6;
 
-/// The regressors of one pixel: bias of the fit, noise, slope, jitter, edge, doubt, hole.
+/// The regressors of one pixel: bend, noise, slope, jitter, edge, hole.
 pub(super) type Regressors = [f64; REGRESSORS];
 
 /// The cause that each regressor belongs to.
 pub(super) const CAUSE_OF: [Cause; REGRESSORS] =
-    [Cause::Density, Cause::Texture, Cause::Depth, Cause::Depth, Cause::Edges, Cause::Edges, Cause::Holes];
+    [Cause::Density, Cause::Texture, Cause::Depth, Cause::Depth, Cause::Edges, Cause::Holes];
 
 /// The regressors of every pixel of a rendering; `of_seen` gives those of a pixel that is in no hole.
 pub(super) fn regressors(
@@ -25,7 +25,7 @@ pub(super) fn regressors(
     let distances = hole_distances(&rendering.mask, rendering.image.width());
     let of_pixel = |(p, away): (usize, &usize)| match away {
         0 => of_seen(p),
-        away => [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, variogram.at(*away)],
+        away => [0.0, 0.0, 0.0, 0.0, 0.0, variogram.at(*away)],
     };
     distances.iter().enumerate().map(of_pixel).collect()
 }

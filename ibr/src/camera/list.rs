@@ -1,8 +1,10 @@
 //! Images with their cameras, as files of other programs list them.
 
+use super::colmap::read_model;
 use super::names::{self, Found, NameError};
-use super::{Camera, Lens};
-use crate::files::InputError;
+use super::transforms::parse_transforms;
+use super::{Camera, Lens, camera_path};
+use crate::files::{self, CHECK_THE_PATH, InputError};
 use hybank_core::messages::Quoted;
 use nalgebra::{Matrix3, Matrix3x4};
 use serde::Deserialize;
@@ -26,6 +28,8 @@ pub struct Frame {
     pub image: PathBuf,
     /// Its depth map, if the list has one.
     pub depth: Option<PathBuf>,
+    /// The image that is black where the photograph shows what is no part of the scene.
+    pub mask: Option<PathBuf>,
     /// Its number in the list, from 1; the one by which a COLMAP model calls it.
     pub(crate) id: u64,
     /// World to camera, with x to the right, y down and z forwards.
@@ -61,6 +65,11 @@ impl Frame {
     }
 }
 
+/// A path of a list; Windows writes backslashes between its parts.
+pub(super) fn portable(path: &str) -> PathBuf {
+    path.replace('\\', "/").into()
+}
+
 /// A camera of a list with the size of its image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ListedCamera {
@@ -78,6 +87,21 @@ impl CameraList {
             by_stem.entry(stem).or_default().push(number);
         }
         Self { path, frames, by_stem }
+    }
+
+    /// The cameras of a file or a folder: a COLMAP model, `transforms.json`, or a camera path of nerfstudio.
+    ///
+    /// # Errors
+    /// [`InputError`].
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        if path.is_dir() {
+            return read_model(path);
+        }
+        let text = files::read_text(path, CHECK_THE_PATH)?;
+        match camera_path::is_path(&text) {
+            true => camera_path::parse_path(&text, path),
+            false => parse_transforms(&text, path),
+        }
     }
 
     /// The file that lists the images.

@@ -1,9 +1,9 @@
 //! Cameras: 3 x 4 matrices, d x~ = Pi X~ (thesis eq. 2.1), pixel centres at integers.
 
+mod camera_path;
 pub mod colmap;
 mod lens;
 mod list;
-pub mod middlebury;
 pub mod names;
 mod path;
 pub mod resize;
@@ -91,6 +91,17 @@ impl Camera {
     /// The same camera with a lens: its pixels are distorted positions, while Pi maps to undistorted ones.
     pub fn with_lens(self, lens: Lens) -> Self {
         Self { lens: Some(lens), ..self }
+    }
+
+    /// The same camera without its lens.
+    pub(crate) fn without_lens(&self) -> Self {
+        Self { lens: None, ..*self }
+    }
+
+    /// A metric camera of the same hand and lens with another matrix; `None` if that is singular.
+    pub(crate) fn with_matrix(&self, matrix: Matrix3x4<f64>) -> Option<Self> {
+        let camera = Self::metric(matrix, self.determinant() < 0.0).ok()?;
+        Some(Self { lens: self.lens, ..camera })
     }
 
     /// Pi.

@@ -28,6 +28,25 @@ impl Parts {
 }
 
 impl Camera {
+    /// The camera whose pose is the inverse of this one's: that of a matrix which maps to the world; `None`
+    /// if it is singular.
+    pub(crate) fn inverted(&self) -> Option<Self> {
+        let Parts { k, rotation, centre } = Parts::of(self);
+        let m = k * rotation.inverse().to_rotation_matrix().matrix();
+        let mut matrix = Matrix3x4::zeros();
+        matrix.fixed_columns_mut::<3>(0).copy_from(&m);
+        matrix.set_column(3, &(m * (rotation * centre)));
+        self.with_matrix(matrix)
+    }
+
+    /// The camera with another focal length and the same principal point; `None` if it is singular.
+    pub(crate) fn zoomed(&self, factor: f64) -> Option<Self> {
+        let mut k = Parts::of(self).k;
+        let inverse = k.try_inverse()?;
+        k.fixed_view_mut::<2, 2>(0, 0).scale_mut(factor);
+        self.with_matrix(k * inverse * self.matrix)
+    }
+
     /// The metric camera at the share t of the way to another one, 0 to 1: centre and calibration change
     /// linearly, and the rotation about one axis at constant speed. The lens is that of this camera.
     ///

@@ -4,7 +4,7 @@
 //! rows y and z of its inverse therefore change their sign. Pixel centres are half-integers there, so the
 //! principal point is shifted by half a pixel on reading.
 
-use super::list::{CameraList, Frame, Inner};
+use super::list::{CameraList, Frame, Inner, portable};
 use crate::files::{self, CHECK_THE_PATH, InputError};
 use hybank_core::messages::{Quoted, of_json};
 use nalgebra::{Matrix3, Matrix3x4, Matrix4};
@@ -25,7 +25,9 @@ struct FileSpec {
 #[derive(Deserialize)]
 struct FrameSpec {
     file_path: String,
-    depth_file_path: Option<PathBuf>,
+    depth_file_path: Option<String>,
+    mask_path: Option<String>,
+    camera_model: Option<String>,
     transform_matrix: Vec<[f64; 4]>,
     #[serde(flatten)]
     inner: Inner,
@@ -57,35 +59,45 @@ pub fn read_transforms(path: &Path) -> Result<CameraList, InputError> {
 pub fn parse_transforms(text: &str, path: &Path) -> Result<CameraList, InputError> {
     let json = |reason: String| InputError::file(path, reason);
     let file: FileSpec = serde_json::from_str(text).map_err(|e| json(of_json(&e.to_string())))?;
-    let straight = ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE"];
-    if let Some(model) = file.camera_model.filter(|model| !straight.contains(&model.as_str())) {
-        let known = straight.join(", ");
-        return Err(json(format!(
-            "camera_model \"{}\" is not supported (supported are {known}); undistort the images first",
-            Quoted(model)
-        )));
-    }
+    check_model(file.camera_model.as_deref()).map_err(json)?;
     if file.frames.is_empty() {
         return Err(json("`frames` is empty: there is no image".into()));
     }
     let one = |(id, spec): (u64, FrameSpec)| {
         let at = || format!(": frame {id} (\"{}\")", Quoted(&spec.file_path));
         let fault = |reason: String| InputError::content(path, at(), reason);
+        check_model(spec.camera_model.as_deref()).map_err(fault)?;
         let inner = spec.inner.or(&file.inner).checked().map_err(fault)?;
         let pose = world_to_camera(&spec.transform_matrix).map_err(fault)?;
-        Ok(Frame { image: image_path(&spec.file_path), depth: spec.depth_file_path, id, pose, inner })
+        let [depth, mask] =
+            [spec.depth_file_path, spec.mask_path].map(|path| path.map(|path| portable(&path)));
+        Ok(Frame { image: image_path(&spec.file_path), depth, mask, id, pose, inner })
     };
     let frames = (1..).zip(file.frames).map(one).collect::<Result<_, InputError>>()?;
     Ok(CameraList::new(path.into(), frames))
 }
 
-/// The path of an image; the synthetic scenes of NeRF leave the extension out.
-fn image_path(name: &str) -> PathBuf {
-    let path = PathBuf::from(name);
-    if path.extension().is_some() { path } else { PathBuf::from(format!("{name}.png")) }
+/// Camera models without more distortion than is read.
+const STRAIGHT: [&str; 6] = ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE"];
+
+fn check_model(model: Option<&str>) -> Result<(), String> {
+    match model.filter(|model| !STRAIGHT.contains(model)) {
+        Some(model) => Err(format!(
+            "camera_model \"{}\" is not supported (supported are {}); undistort the images first",
+            Quoted(model),
+            STRAIGHT.join(", ")
+        )),
+        None => Ok(()),
+    }
 }
 
-fn world_to_camera(rows: &[[f64; 4]]) -> Result<Matrix3x4<f64>, String> {
+/// The path of an image; the synthetic scenes of NeRF leave the extension out.
+fn image_path(name: &str) -> PathBuf {
+    let path = portable(name);
+    if path.extension().is_some() { path } else { PathBuf::from(format!("{}.png", path.display())) }
+}
+
+pub(super) fn world_to_camera(rows: &[[f64; 4]]) -> Result<Matrix3x4<f64>, String> {
     if !(3..=4).contains(&rows.len()) {
         return Err(format!("transform_matrix has {} rows: it needs 3 or 4", rows.len()));
     }
@@ -134,7 +146,7 @@ impl Inner {
         )
     }
 
-    fn checked(self) -> Result<Self, String> {
+    pub(super) fn checked(self) -> Result<Self, String> {
         let bends = [("k3", self.k3), ("k4", self.k4)];
         if self.is_fisheye == Some(true) || bends.iter().any(|(_, k)| k.is_some_and(|k| k != 0.0)) {
             return Err("the lens has more than k1, k2, p1 and p2; undistort the images first".into());
@@ -165,6 +177,22 @@ impl Inner {
 mod tests {
     use super::*;
     use nalgebra::Vector3;
+
+    /// A model in a frame is refused as one of the whole file, and backslashes part folders.
+    #[test]
+    fn frames_have_models_and_paths_of_windows() {
+        let text = |model: &str| {
+            format!(
+                r#"{{"w": 4, "h": 4, "fl_x": 5, "frames": [{{"file_path": "a\\b.png", "depth_file_path": "d\\b.png",
+                "camera_model": "{model}", "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}}]}}"#
+            )
+        };
+        let list = parse_transforms(&text("OPENCV"), Path::new("t.json")).unwrap();
+        let frame = &list.frames[0];
+        assert_eq!((&frame.image, frame.depth.as_deref()), (&"a/b.png".into(), Some(Path::new("d/b.png"))));
+        let refused = parse_transforms(&text("OPENCV_FISHEYE"), Path::new("t.json")).unwrap_err().to_string();
+        assert!(refused.contains("frame 1") && refused.contains("OPENCV_FISHEYE"), "{refused}");
+    }
 
     const FILE: &str = r#"{
         "camera_angle_x": 1.5707963267948966, "w": 200, "h": 100, "k1": 0.0,

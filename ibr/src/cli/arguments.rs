@@ -1,11 +1,11 @@
 //! Command-line arguments.
 
-use crate::image::{FrameRate, Levels};
+use crate::image::Levels;
 use crate::interpolate::plane::PlaneSettings;
 use crate::interpolate::{Degree, HoleFill};
-use crate::pipeline::{Method, RenderSettings};
+use crate::pipeline::RenderSettings;
+use crate::scene::Unknown;
 use clap::{Args, Parser, Subcommand};
-use hybank_core::messages::Quoted;
 use std::path::PathBuf;
 
 /// Renders new views from photographs with depth (image-based rendering).
@@ -23,9 +23,8 @@ const EXAMPLES: &str = "Examples:
   hybank-ibr render scene.toml --view centre -o centre.png --truth centre-photo.png
   hybank-ibr render scene.toml --depth-step 6 -o sparse.png --json
   hybank-ibr render path.toml -o film.y4m
-  hybank-ibr bound scene.toml --map error.png
-  hybank-ibr place scene.toml --choose 4
-  hybank-ibr demo -o demo.png
+  hybank-ibr evaluate folder --every 8
+  hybank-ibr bound scene.toml --map error.pfm
 
 Exit codes: 0 done, 1 the input failed, 2 wrong usage.";
 
@@ -33,19 +32,15 @@ Exit codes: 0 done, 1 the input failed, 2 wrong usage.";
 pub(super) enum Command {
     /// Render the virtual view of a scene.
     Render(Box<RenderArguments>),
+    /// Leave out every 8th view in turn, render it from the others and compare it with its photograph.
+    Evaluate(EvaluateArguments),
     /// Predict the error of the virtual view without a photograph of it, and what makes it smaller.
     Bound(BoundArguments),
-    /// Choose the views of a scene from which the virtual view has the least predicted error.
-    Place(PlaceArguments),
-    /// Write the scene file of a folder: a COLMAP workspace, transforms.json, a pair of Middlebury, or two
-    /// photographs.
+    /// Write the scene file of a folder: a COLMAP workspace, transforms.json, or two photographs.
     Init(InitArguments),
-    /// Render a synthetic scene with exact depth, compare the result with the exact view, and write a
-    /// contact sheet.
-    Demo(DemoArguments),
 }
 
-/// What `render`, `bound` and `place` share.
+/// What `render`, `evaluate` and `bound` share.
 #[derive(Debug, Args)]
 pub(super) struct SceneArguments {
     /// Scene file (TOML), `-` for standard input, or a folder of which `init` makes a scene.
@@ -67,6 +62,9 @@ pub(super) struct SceneArguments {
     /// Use the brightness of every view as it is, instead of giving all the exposure of the first.
     #[arg(long)]
     pub(super) keep_exposure: bool,
+    /// Do not correct the cameras, or the rows of a rig, where the photographs do not fit each other.
+    #[arg(long)]
+    pub(super) keep_cameras: bool,
     /// Print the results as one JSON object.
     #[arg(long)]
     pub(super) json: bool,
@@ -125,54 +123,41 @@ pub(super) struct RenderArguments {
     /// depth lie, black for disocclusions.
     #[arg(long, value_name = "FILE")]
     pub(super) mask: Option<PathBuf>,
-    /// Also write the depth of the virtual view (.pfm), NaN in holes: millimetres of a rig with calib.txt,
-    /// disparities in pixels for a baseline of one of other rectified rigs, depths in the unit of general
-    /// cameras, and an order without a unit of scenes without cameras.
+    /// Also write the depth of the virtual view (.pfm), NaN in holes: disparities in pixels for a baseline
+    /// of one of rectified rigs, depths in the unit of general cameras, and an order without a unit of
+    /// scenes without cameras.
     #[arg(long, value_name = "FILE")]
     pub(super) depth: Option<PathBuf>,
-    /// Also write how many visible samples fall on each pixel (.png of 16 bits or .pfm).
-    #[arg(long, value_name = "FILE")]
-    pub(super) count: Option<PathBuf>,
-    /// Also write where the view differs from --truth: as a picture, black is no error and white the
-    /// largest, or as numbers in grey levels (.pfm).
-    #[arg(long, value_name = "FILE", requires = "truth")]
-    pub(super) error: Option<PathBuf>,
     /// Write a PNG with an alpha channel: transparent where no view shows what is there.
     #[arg(long)]
     pub(super) alpha: bool,
-    /// Frames per second that a film says it has: 25, 29.97 or 30000/1001 [default: 25].
-    #[arg(long, value_name = "RATE")]
-    pub(super) fps: Option<FrameRate>,
+    /// Frames per second that a film says it has [default: 25].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) fps: Option<u32>,
     /// Use only the K views nearest to the virtual camera, by angle and distance; not in scenes without
     /// cameras.
     #[arg(long, value_name = "K")]
     pub(super) nearest: Option<usize>,
+    /// Render the cameras of this file instead of [virtual]: a camera path of nerfstudio, a transforms.json
+    /// or the folder of a COLMAP model.
+    #[arg(long, value_name = "FILE")]
+    pub(super) cameras: Option<PathBuf>,
     /// Bits per value of a PNG, 8 or 16.
     #[arg(long, value_name = "N", value_enum, default_value_t = Levels::Eight, hide_possible_values = true)]
     pub(super) bits: Levels,
-    /// How samples are interpolated.
-    #[arg(long, value_enum, default_value_t = Method::Auto)]
-    pub(super) method: Method,
     /// How holes are filled.
     #[arg(long, value_enum, default_value_t = HoleFill::Background)]
     pub(super) fill: HoleFill,
-    /// Drop pixels of unknown depth instead of filling it from the farther neighbour.
-    #[arg(long)]
-    pub(super) drop_unknown: bool,
-    /// Degree of the splines of the plane; rows are cubic, and scenes without cameras have none
-    /// [default: cubic]. A linear plane takes less time and is less sharp.
+    /// What unknown depths are taken for [default: as the scene says, or auto].
+    #[arg(long, value_enum)]
+    pub(super) unknown: Option<Unknown>,
+    /// Degree of the splines for general cameras [default: cubic]. Linear ones take less time and are less
+    /// sharp.
     #[arg(long, value_enum)]
     pub(super) degree: Option<Degree>,
-    /// Weight of the slope penalty of the row fit (rectified rigs), px^2 [default: from the noise of the
-    /// photographs, 0.01 to 4].
-    #[arg(long, value_name = "L")]
-    pub(super) lambda: Option<f64>,
     /// Seed of the robust estimators (scenes without cameras) [default: 1].
     #[arg(long)]
     pub(super) seed: Option<u64>,
-    /// Exchange near and far (scenes without cameras).
-    #[arg(long)]
-    pub(super) reverse_order: bool,
     /// Overwrite existing files.
     #[arg(long)]
     pub(super) force: bool,
@@ -181,69 +166,70 @@ pub(super) struct RenderArguments {
 impl RenderArguments {
     /// The settings that were typed over the defaults; `offset` is that of the scene.
     pub(super) fn settings(&self, offset: f64) -> RenderSettings {
-        let keep_smoothing = self.lambda.is_some();
-        let nearest = self.nearest;
-        let mut settings = RenderSettings { nearest, keep_smoothing, ..self.scene.settings(offset) };
-        settings.method = self.method;
+        let mut settings = RenderSettings { nearest: self.nearest, ..self.scene.settings(offset) };
         let stage = &mut settings.interpolation;
         stage.fill = self.fill;
         if self.degree == Some(Degree::Linear) {
             stage.plane = PlaneSettings::LINEAR;
         }
-        stage.fit.lambda = self.lambda.unwrap_or(stage.fit.lambda);
         settings
     }
+}
+
+const EVALUATE_EXAMPLES: &str = "Examples:
+  hybank-ibr evaluate folder
+      leaves out the views 1, 9, 17 and so on, and prints PSNR, SSIM and mean absolute error of each and the means
+  hybank-ibr evaluate scene.toml --every 1 --predict --pictures rendered
+      leaves out every view in turn, predicts each error too, and writes the views that were rendered";
+
+#[derive(Debug, Args)]
+#[command(after_help = EVALUATE_EXAMPLES)]
+pub(super) struct EvaluateArguments {
+    #[command(flatten)]
+    pub(super) scene: SceneArguments,
+    /// Leave out the first view and every K-th after it.
+    #[arg(long, value_name = "K", default_value = "8", value_parser = step)]
+    pub(super) every: usize,
+    /// Use only the K views nearest to each virtual camera.
+    #[arg(long, value_name = "K", value_parser = step)]
+    pub(super) nearest: Option<usize>,
+    /// Predict the error of each view too, as `bound` does; this takes about ten times as long.
+    #[arg(long)]
+    pub(super) predict: bool,
+    /// Write the rendered views into this folder, as PNG with the numbers of the views.
+    #[arg(long, value_name = "FOLDER")]
+    pub(super) pictures: Option<PathBuf>,
+    /// Overwrite existing files.
+    #[arg(long)]
+    pub(super) force: bool,
+}
+
+fn step(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|count| *count > 0).ok_or_else(|| "it must be a whole number from 1 on".into())
 }
 
 const BOUND_EXAMPLES: &str = "Examples:
   hybank-ibr bound scene.toml
       prints how large the error of the virtual view will be, its causes, and what would make it smaller
-  hybank-ibr bound scene.toml --map error.png --truth photo.png
-      also writes where the error is, and compares the prediction with a photograph
-  hybank-ibr bound scene.toml --map error.pfm
-      writes numbers in grey levels, three channels: limit, expected, estimate
+  hybank-ibr bound scene.toml --map error.pfm --truth photo.png
+      also writes the estimate of every pixel, and compares the prediction with a photograph
 
 Figures, in grey levels:
   estimate   mean absolute error, calibrated by leaving out each view in turn
   expected   root mean square error, a bound of the expected mean error
-  limit      not exceeded where slopes, second differences and residuals are at most those of the samples
-             nearby; not sure, as photographs break that
-The view of a rectified rig is the one that `render --method rows` gives. Of several virtual views each is
-predicted, and files are numbered. Scenes without cameras are refused.";
+Of several virtual views each is predicted, and files are numbered. Scenes without cameras are refused.";
 
 #[derive(Debug, Args)]
 #[command(after_help = BOUND_EXAMPLES)]
 pub(super) struct BoundArguments {
     #[command(flatten)]
     pub(super) scene: SceneArguments,
-    /// Write the error of every pixel: as a picture of the estimate, where black is no error and white the
-    /// largest, or as numbers (.pfm): limit, expected error and estimate in grey levels.
+    /// Write the estimate of every pixel in grey levels (.pfm).
     #[arg(long, value_name = "FILE")]
     pub(super) map: Option<PathBuf>,
     /// Overwrite existing files.
     #[arg(long)]
     pub(super) force: bool,
-}
-
-const PLACE_EXAMPLES: &str = "Examples:
-  hybank-ibr place scene.toml --choose 4
-      names the 4 views of the scene from which the virtual view has the least predicted error, and prints
-      that error beside those of all views and of 4 views that are spread evenly over the list
-  hybank-ibr place scene.toml --choose 2 --view centre --truth centre-photo.png
-      chooses among the other views for the place of one, and compares the predictions with its photograph
-
-The errors are the estimates of `bound`, of a path their mean over its views, with weights that are calibrated
-on all views of the scene. Up to 500 sets of views are all tried. Of more, greedy choices from seven first
-views are improved by exchanges. Scenes without cameras are refused.";
-
-#[derive(Debug, Args)]
-#[command(after_help = PLACE_EXAMPLES)]
-pub(super) struct PlaceArguments {
-    #[command(flatten)]
-    pub(super) scene: SceneArguments,
-    /// Number of views to choose.
-    #[arg(long, value_name = "K")]
-    pub(super) choose: usize,
 }
 
 const INIT_EXAMPLES: &str = "Examples:
@@ -265,26 +251,10 @@ pub(super) struct InitArguments {
     /// Scene file to write; `-` is standard output. Its paths are relative to its folder where they can be.
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: PathBuf,
+    /// The virtual view is the place of this image, which is no view then; also one that only has a camera.
+    #[arg(long, value_name = "NAME")]
+    pub(super) view: Option<String>,
     /// Overwrite an existing file.
-    #[arg(long)]
-    pub(super) force: bool,
-    /// Number of threads [default: all cores].
-    #[arg(long, value_name = "N")]
-    pub(super) threads: Option<usize>,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct DemoArguments {
-    /// Contact sheet to write.
-    #[arg(short, long, value_name = "FILE", default_value = "hybank-ibr-demo.png")]
-    pub(super) output: PathBuf,
-    /// Width and height of the views.
-    #[arg(long, value_name = "WxH", default_value = "480x360", value_parser = size)]
-    pub(super) size: (usize, usize),
-    /// Print the results as one JSON object.
-    #[arg(long)]
-    pub(super) json: bool,
-    /// Overwrite existing files.
     #[arg(long)]
     pub(super) force: bool,
     /// Number of threads [default: all cores].
@@ -302,18 +272,6 @@ fn pixels(text: &str) -> Result<usize, String> {
     }
 }
 
-/// Sides that the demo renders: enough for its shapes, and no more than a screen holds.
-const SIDES: std::ops::RangeInclusive<usize> = 64..=4096;
-
-fn size(text: &str) -> Result<(usize, usize), String> {
-    let (w, h) = text.split_once('x').ok_or("write it as WIDTHxHEIGHT, for example 480x360")?;
-    let side = |s: &str| match s.parse() {
-        Ok(n) if SIDES.contains(&n) => Ok(n),
-        _ => Err(format!("\"{}\" is not a number from {} to {}", Quoted(s), SIDES.start(), SIDES.end())),
-    };
-    Ok((side(w)?, side(h)?))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -326,8 +284,6 @@ mod tests {
 
     #[test]
     fn sizes_are_checked() {
-        assert_eq!(size("640x480"), Ok((640, 480)));
-        assert!(size("640").is_err() && size("0x9").is_err() && size("9000x90").is_err());
         assert_eq!(pixels("268435456"), Ok(LARGEST));
         assert!(pixels("0").is_err() && pixels("268435457").is_err());
     }

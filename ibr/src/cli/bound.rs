@@ -2,12 +2,11 @@
 
 use super::arguments::BoundArguments;
 use super::failure::{Failure, failed};
+use super::inputs;
 use super::output::{self, Encoded, Outputs, Part, check_files};
-use super::progress::Progress;
-use super::{heat, inputs};
-use crate::analysis::{Cause, Predicted, Predictor, Totals, ViewError};
-use crate::image::{Image, Levels, quality};
-use crate::pipeline::{Agreement, RenderError, Watch};
+use crate::analysis::{Cause, Predictor, Totals, ViewError};
+use crate::image::{Image, Levels, pfm, quality};
+use crate::pipeline::{Agreement, Geometry, RenderError};
 use crate::scene::{Kind, Scene, SourceView};
 use hybank_core::messages::Quoted;
 use serde::Serialize;
@@ -17,12 +16,9 @@ pub(super) fn run(arguments: &BoundArguments) -> Result<(), Failure> {
     arguments.scene.check()?;
     let outputs = Outputs::of(&[(Part::Map, arguments.map.as_ref())]);
     outputs.check(Levels::Eight, arguments.force)?;
-    let progress = Progress::new(3);
-    progress.step("reading");
-    let (scene, files) = read(arguments, outputs, &|share| progress.within(share))?;
+    let (scene, files) = read(arguments, outputs)?;
     let truth = arguments.scene.truth()?;
-    progress.step("calibrating");
-    let job = Job { arguments, scene: &scene, files, truth, progress };
+    let job = Job { arguments, scene: &scene, files, truth };
     match &scene.kind {
         Kind::Rectified { views, positions } => job.predict(views, positions, views[0].image.size()),
         Kind::Calibrated { views, cameras, size } => job.predict(views, cameras, *size),
@@ -37,65 +33,44 @@ struct Job<'a> {
     /// Those of each virtual view.
     files: Vec<Outputs>,
     truth: Option<Image>,
-    progress: Progress,
 }
 
 impl Job<'_> {
     /// Predicts the views of `cameras`, writes their files and prints the report.
-    fn predict<P: Predicted>(
+    fn predict<P: Geometry>(
         self,
         views: &[SourceView<P>],
         cameras: &[P],
         size: (usize, usize),
     ) -> Result<(), Failure> {
-        let Self { arguments, scene, files, truth, progress } = self;
+        let Self { arguments, scene, files, truth } = self;
         let named = |e: RenderError| failed(e).in_file(&arguments.scene.file);
         let views: Vec<_> = views.iter().map(SourceView::view).collect();
         let predictor = Predictor::new(&views, &arguments.scene.settings(scene.offset)).map_err(named)?;
-        progress.step("predicting");
-        let (mut summaries, mut written) = (Vec::new(), Vec::new());
-        for (frame, (camera, outputs)) in cameras.iter().zip(&files).enumerate() {
+        let mut summaries = Vec::new();
+        for (camera, outputs) in cameras.iter().zip(&files) {
             let predicted = predictor.at(camera, size).map_err(named)?;
             let mut summary = Summary::new(&predicted, predictor.agreement(), &scene.outliers);
             summary.measure(&predicted, truth.as_ref(), arguments.scene.truth.as_deref())?;
             for (_, path) in &outputs.parts {
-                let (encoded, white) = map(&predicted, path)?;
-                summary.white = white;
-                written.extend(output::begin(&[encoded], arguments.force)?);
+                let estimate = Image::from_values(size, 1, predicted.estimate.clone());
+                output::write(&[Encoded { bytes: pfm::encode(&estimate), path }], arguments.force)?;
             }
             summaries.push(summary);
-            progress.within((frame + 1) as f64 / cameras.len() as f64);
         }
-        output::commit(written)?;
-        drop(progress);
         inputs::warn_of_contradictions(predictor.agreement(), &scene.kind);
         print(summaries, predictor.agreement(), arguments.scene.json)
     }
 }
 
 /// The scene, and the files of each of its virtual views.
-fn read(
-    arguments: &BoundArguments,
-    outputs: Outputs,
-    watch: Watch<'_>,
-) -> Result<(Scene, Vec<Outputs>), Failure> {
-    let source = arguments.scene.source()?;
+fn read(arguments: &BoundArguments, outputs: Outputs) -> Result<(Scene, Vec<Outputs>), Failure> {
+    let source = arguments.scene.source(None)?;
     let files = outputs.of_frames(source.frames(&arguments.scene));
     check_files(&files, None, &source, &arguments.scene, arguments.force)?;
-    let scene = arguments.scene.load(&source, true, watch)?;
+    let scene = arguments.scene.load(&source, None, None)?;
     arguments.scene.refuse_what_has_no_prediction(&scene)?;
     Ok((scene, files))
-}
-
-/// A picture of the estimate and the estimate that is white in it, or the three numbers of every pixel as a
-/// float map.
-fn map<'a>(predicted: &ViewError, path: &'a Path) -> Result<(Encoded<'a>, Option<f32>), Failure> {
-    let size = predicted.rendering.image.size();
-    heat::encoded(&predicted.estimate, size, path, || {
-        let pixels = predicted.local_limit.iter().zip(&predicted.expected).zip(&predicted.estimate);
-        let data = pixels.flat_map(|((limit, expected), estimate)| [*limit, *expected, *estimate]).collect();
-        Image::from_values(size, 3, data)
-    })
 }
 
 /// The prediction for one virtual view, in grey levels unless named.
@@ -115,8 +90,6 @@ struct Summary {
     /// Standard deviation of the disparities' errors for a baseline of one, in pixels; of general cameras
     /// that of the relative errors of depth.
     disparity_noise: f64,
-    /// Estimate that is white in the picture of --map.
-    white: Option<f32>,
     measured: Option<Measured>,
     rows: Vec<Totals>,
 }
@@ -135,8 +108,6 @@ struct Measured {
     psnr: f64,
     /// Estimate divided by the measured mean absolute error.
     ratio: f64,
-    /// Share of the pixels whose error is within the local limit.
-    within_local_limit: f64,
 }
 
 /// What to do first where the inputs contradict each other.
@@ -168,7 +139,6 @@ impl Summary {
             inputs_agree,
             calibrated_on: predicted.calibration.views,
             disparity_noise: predicted.calibration.disparity_noise,
-            white: None,
             measured: None,
             rows: predicted.rows(),
         }
@@ -185,12 +155,8 @@ impl Summary {
         let named = |e| Failure::Input(format!("{}: {e}", Quoted(path)));
         let image = &predicted.rendering.image;
         let Some(found) = quality::compare(image, truth, None).map_err(named)? else { return Ok(()) };
-        self.measured = Some(Measured {
-            mae: found.mae,
-            psnr: found.psnr,
-            ratio: self.totals.estimate / found.mae,
-            within_local_limit: predicted.within_local_limit(truth),
-        });
+        self.measured =
+            Some(Measured { mae: found.mae, psnr: found.psnr, ratio: self.totals.estimate / found.mae });
         Ok(())
     }
 
@@ -199,10 +165,6 @@ impl Summary {
         let mut lines = vec![
             format!("estimate  {:.2} grey levels of mean absolute error", t.estimate),
             format!("expected  {:.2} root mean square, a PSNR of {:.1} dB", t.expected, t.psnr),
-            format!(
-                "limit     {:.2} in the mean, if slopes and residuals are nowhere larger than at the samples",
-                t.local_limit
-            ),
         ];
         let part = |c: &CauseShare| format!("{:?} {:.2}", c.cause, c.error).to_lowercase();
         lines.push(format!("causes    {}", self.causes.iter().map(part).collect::<Vec<_>>().join(", ")));
@@ -218,13 +180,7 @@ impl Summary {
 }
 
 fn measured(m: &Measured) -> String {
-    format!(
-        "measured  MAE {:.2} (estimate / measured {:.2}), PSNR {:.2} dB; {:.1} % of the pixels within the limit",
-        m.mae,
-        m.ratio,
-        m.psnr,
-        100.0 * m.within_local_limit
-    )
+    format!("measured  MAE {:.2} (estimate / measured {:.2}), PSNR {:.2} dB", m.mae, m.ratio, m.psnr)
 }
 
 /// The predictions for all virtual views of a scene.

@@ -24,3 +24,9 @@ pub(super) fn of_view(failure: Failure, view: usize, all: usize) -> Failure {
         other => other,
     }
 }
+
+impl From<crate::files::InputError> for Failure {
+    fn from(error: crate::files::InputError) -> Self {
+        failed(error)
+    }
+}

@@ -12,7 +12,7 @@ pub(super) fn run(arguments: &InitArguments) -> Result<(), Failure> {
     let path = &arguments.output;
     output::refuse_existing(path, arguments.force)?;
     let beside = if is_dash(path) { Path::new("") } else { path.parent().unwrap_or(Path::new("")) };
-    let scene = scene::describe(&arguments.inputs, beside).map_err(failed)?;
+    let scene = scene::describe(&arguments.inputs, arguments.view.as_deref(), beside).map_err(failed)?;
     let (files, text) = (scene.spec.files(beside), scene.text().map_err(failed)?);
     output::refuse_overlaps(&[path], &files.iter().map(PathBuf::as_path).collect::<Vec<_>>())?;
     output::write(&[Encoded { bytes: text.into_bytes(), path }], arguments.force)?;

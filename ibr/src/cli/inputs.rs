@@ -18,13 +18,7 @@ pub(super) fn warn_of_contradictions(agreement: &Agreement, kind: &Kind) {
         _ => "cameras and depth_scale",
     };
     for pair in agreement.pairs.iter().filter(|p| p.is_poor()) {
-        PROGRAM.warn(&format!(
-            "views {} and {} agree in depth and colour at only {:.0} % of {} points; check their {suspects}",
-            pair.views[0] + 1,
-            pair.views[1] + 1,
-            100.0 * pair.share,
-            pair.points
-        ));
+        PROGRAM.warn(&format!("{pair}; check their {suspects}"));
     }
 }
 

@@ -2,14 +2,11 @@
 
 mod arguments;
 mod bound;
-mod demo;
+mod evaluate;
 mod failure;
-mod heat;
 mod init;
 mod inputs;
 mod output;
-mod place;
-mod progress;
 mod render;
 mod source;
 mod summary;
@@ -33,9 +30,8 @@ pub fn run() -> ExitCode {
     let outcome = match arguments.command {
         Command::Render(arguments) => in_pool(arguments.scene.threads, || render::run(&arguments)),
         Command::Bound(arguments) => in_pool(arguments.scene.threads, || bound::run(&arguments)),
-        Command::Place(arguments) => in_pool(arguments.scene.threads, || place::run(&arguments)),
+        Command::Evaluate(arguments) => in_pool(arguments.scene.threads, || evaluate::run(&arguments)),
         Command::Init(arguments) => in_pool(arguments.threads, || init::run(&arguments)),
-        Command::Demo(arguments) => in_pool(arguments.threads, || demo::run(&arguments)),
     };
     PROGRAM.end(outcome)
 }

@@ -4,7 +4,7 @@ use super::arguments::SceneArguments;
 use super::failure::{Failure, failed, usage};
 use super::source::Source;
 use crate::image::{self, Image, Levels};
-use hybank_core::files::{AtomicFile, FileError, check_output, commit_all};
+use hybank_core::files::{FileError, check_output};
 use hybank_core::messages::{Quoted, printable};
 use hybank_program::{is_dash, print, print_bytes, say};
 use serde::Serialize;
@@ -48,25 +48,12 @@ pub(super) fn encoded<'a>(image: &Image, path: &'a Path, levels: Levels) -> Resu
     Ok(Encoded { bytes: image::encode(image, format, levels).map_err(failed)?, path })
 }
 
-/// Writes files, which appear together, and prints what goes to standard output.
+/// Writes files, each of which appears when it is whole, and prints what goes to standard output.
 pub(super) fn write(outputs: &[Encoded<'_>], force: bool) -> Result<(), Failure> {
-    commit(begin(outputs, force)?)
-}
-
-/// Writes files without giving them their names yet, and prints what goes to standard output. The files are
-/// closed: a long path has more than a process may have open.
-pub(super) fn begin(outputs: &[Encoded<'_>], force: bool) -> Result<Vec<AtomicFile>, Failure> {
-    let (to_output, to_files): (Vec<_>, Vec<_>) = outputs.iter().partition(|e| is_dash(e.path));
-    let files = to_files.iter().map(|e| image::begin(&e.bytes, e.path, force));
-    let mut files = files.collect::<Result<Vec<_>, _>>().map_err(failed)?;
-    files.iter_mut().try_for_each(AtomicFile::seal).map_err(failed)?;
-    to_output.iter().try_for_each(|e| print_bytes(&e.bytes))?;
-    Ok(files)
-}
-
-/// Gives the files their names, all or none.
-pub(super) fn commit(files: Vec<AtomicFile>) -> Result<(), Failure> {
-    commit_all(files).map_err(failed)
+    outputs.iter().try_for_each(|e| match is_dash(e.path) {
+        true => print_bytes(&e.bytes),
+        false => image::write_file(&e.bytes, e.path, force).map_err(failed),
+    })
 }
 
 /// The name of view `frame` of a path, from 0: its number from 1, of four digits, before the extension.
@@ -103,8 +90,6 @@ pub(super) enum Part {
     View,
     Mask,
     Depth,
-    Count,
-    Error,
     /// The predicted error of every pixel.
     Map,
 }
@@ -118,17 +103,15 @@ impl Part {
             Self::View => "-o",
             Self::Mask => "--mask",
             Self::Depth => "--depth",
-            Self::Count => "--count",
-            Self::Error => "--error",
             Self::Map => "--map",
         }
     }
 
     /// Refuses a file whose ending is not one of its formats.
     fn check(self, path: &Path, levels: Levels) -> Result<(), Failure> {
-        let allowed: &[&str] = match self {
-            Self::Depth => &["pfm"],
-            Self::Count => &["png", "pfm"],
+        match self {
+            Self::Depth | Self::Map if ends_with(path, "pfm") => return Ok(()),
+            Self::Depth | Self::Map => (),
             Self::View if is_film(path) => return Ok(()),
             Self::View if PACKED_FILMS.iter().any(|ending| ends_with(path, ending)) => {
                 let (shown, film) = (Quoted(path), path.with_extension("y4m"));
@@ -139,15 +122,11 @@ impl Part {
                 ));
             }
             Self::View => return refuse_format(path, levels),
-            Self::Mask | Self::Error | Self::Map => return refuse_format(path, Levels::Eight),
-        };
-        if allowed.iter().any(|ending| ends_with(path, ending)) {
-            return Ok(());
+            Self::Mask => return refuse_format(path, Levels::Eight),
         }
         let (option, path) = (self.option(), Quoted(path));
         let name = option.trim_start_matches('-');
-        let endings: Vec<String> = allowed.iter().map(|ending| format!(".{ending}")).collect();
-        usage(format!("{option} {path}: {name} is written as {}", endings.join(" or ")))
+        usage(format!("{option} {path}: {name} is written as .pfm"))
     }
 }
 

@@ -3,63 +3,50 @@
 mod concerns;
 mod outputs;
 mod path;
+mod ready;
 
 use super::arguments::RenderArguments;
 use super::failure::{Failure, PROGRAM, failed, of_view, usage};
 use super::output::{self, Outputs, check_files};
-use super::progress::Progress;
 use super::summary::Summary;
 use crate::image::{Image, quality};
-use crate::pipeline::uncalibrated::UncalibratedSettings;
-use crate::pipeline::{Method, Rendering, Watch, calibrated, rectified, uncalibrated};
-use crate::scene::{Kind, Scene, SourceView};
+use crate::interpolate::HoleFill;
+use crate::scene::{Kind, Scene};
 use concerns::Concerns;
 use hybank_core::messages::Quoted;
 use hybank_program::is_dash;
+use indicatif::ProgressBar;
 use path::Film;
+use ready::{Ready, Rendered};
 use std::path::Path;
 use std::time::Instant;
 
-/// A rendering with the region that is compared, unless that is the whole image.
-struct Rendered {
-    rendering: Rendering,
-    hull: Option<Vec<bool>>,
-    geometry: Option<uncalibrated::GeometryReport>,
-}
-
 pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     check(arguments)?;
-    let progress = Progress::new(1);
-    progress.step("reading");
     let start = Instant::now();
-    let (scene, files) = read(arguments, &|share| progress.within(share))?;
-    let preparation = start.elapsed().as_secs_f64();
+    let (scene, files) = read(arguments)?;
     check_kind(&scene.kind, arguments)?;
     check_nearest(&scene.kind, arguments)?;
     let frames = files.len();
     let truth = arguments.scene.truth()?;
-    drop(progress);
-    let progress = Progress::new(frames as u64 + 1);
     let mut film = path::is_film(&arguments.output, frames).then(|| Film::new(arguments)).transpose()?;
-    let (mut summaries, mut written, mut concerns) = (Vec::new(), Vec::new(), Concerns::default());
+    let (mut summaries, mut concerns) = (Vec::new(), Concerns::default());
+    let ready = Ready::new(&scene, arguments).map_err(|e| e.in_file(&arguments.scene.file))?;
+    let preparation = start.elapsed().as_secs_f64();
+    let bar = ProgressBar::new(frames as u64);
     for (frame, files) in files.iter().enumerate() {
-        progress.step("rendering");
-        let watch = |share| progress.within(share);
-        let (done, mut summary) = timed(&scene, frame, preparation, arguments, &watch)?;
+        let (done, mut summary) = timed(&scene, &ready, frame, preparation, arguments)?;
         if let (Some(truth), Some(path)) = (&truth, &arguments.scene.truth) {
             compare(&mut summary, &done, truth, path)?;
         }
         concerns.add(&done);
         film.as_mut().map_or(Ok(()), |film| film.append(&done.rendering.image))?;
-        let (encoded, white) = arguments.encoded(files, &done.rendering, truth.as_ref())?;
-        summary.error_white = white;
-        written.extend(output::begin(&encoded, arguments.force)?);
+        output::write(&arguments.encoded(files, &done.rendering)?, arguments.force)?;
         summaries.push(summary);
+        bar.inc(1);
     }
-    progress.step("writing");
-    written.extend(film.and_then(|film| film.file));
-    output::commit(written)?;
-    drop(progress);
+    bar.finish_and_clear();
+    film.and_then(|film| film.file).map_or(Ok(()), |file| file.commit()).map_err(failed)?;
     concerns.warn(&scene.kind);
     path::report(&summaries, &files, arguments)
 }
@@ -67,18 +54,18 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
 /// One virtual view of a scene, and its summary.
 fn timed(
     scene: &Scene,
+    ready: &Ready<'_>,
     frame: usize,
     preparation: f64,
     arguments: &RenderArguments,
-    watch: Watch<'_>,
 ) -> Result<(Rendered, Summary), Failure> {
     let start = Instant::now();
     let named = |e: Failure| of_view(e, frame, scene.kind.frames()).in_file(&arguments.scene.file);
-    let done = render(scene, frame, arguments, watch).map_err(named)?;
+    let done = ready.render(frame).map_err(named)?;
     let mut summary = Summary::new(&done.rendering, start.elapsed().as_secs_f64(), scene.filled);
     summary.preparation_seconds = preparation;
     summary.geometry = done.geometry.clone();
-    summary.depths = outputs::unit_of_depths(scene, arguments.depth.is_some());
+    summary.depths = outputs::unit_of_depths(&scene.kind, arguments.depth.is_some());
     Ok((done, summary))
 }
 
@@ -90,6 +77,9 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
     if arguments.nearest == Some(0) {
         return usage("--nearest 0: at least one view must be used");
     }
+    if arguments.cameras.is_some() && arguments.scene.view.is_some() {
+        return usage("--cameras and --view both say which views are rendered; leave one out");
+    }
     arguments.scene.check()?;
     arguments.check_outputs()
 }
@@ -97,16 +87,15 @@ fn check(arguments: &RenderArguments) -> Result<(), Failure> {
 /// Refuses options that only other kinds of scenes have a use for.
 fn check_kind(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure> {
     let has_cameras = !matches!(kind, Kind::Uncalibrated { .. });
-    let in_rows = matches!(kind, Kind::Rectified { .. }) && arguments.method != Method::Plane;
+    let is_general = matches!(kind, Kind::Calibrated { .. });
     let unused = [
         ("--seed", "a scene without cameras", arguments.seed.is_some() && has_cameras),
-        ("--reverse-order", "a scene without cameras", arguments.reverse_order && has_cameras),
-        ("--degree", "a scene with cameras", arguments.degree.is_some() && !has_cameras),
-        (
-            "--lambda",
-            "the row fit, so a rectified rig and --method rows",
-            arguments.lambda.is_some() && !in_rows,
-        ),
+        ("--degree", "a scene of general cameras", arguments.degree.is_some() && !is_general),
+        ("--unknown", "a scene with depth", arguments.unknown.is_some() && !has_cameras),
+        ("--depth-step", "a scene with depth", arguments.scene.depth_step > 1 && !has_cameras),
+        ("--keep-cameras", "a scene with cameras", arguments.scene.keep_cameras && !has_cameras),
+        ("--keep-exposure", "a scene with cameras", arguments.scene.keep_exposure && !has_cameras),
+        ("--fill bridge", "a scene with cameras", arguments.fill == HoleFill::Bridge && !has_cameras),
     ];
     match unused.iter().find(|(.., is_unused)| *is_unused) {
         Some((option, needs, _)) => {
@@ -133,47 +122,14 @@ fn check_nearest(kind: &Kind, arguments: &RenderArguments) -> Result<(), Failure
 }
 
 /// The scene, and the files of each of its virtual views.
-fn read(arguments: &RenderArguments, watch: Watch<'_>) -> Result<(Scene, Vec<Outputs>), Failure> {
-    let source = arguments.scene.source()?;
+fn read(arguments: &RenderArguments) -> Result<(Scene, Vec<Outputs>), Failure> {
+    let source = arguments.scene.source(arguments.cameras.as_deref())?;
     let frames = source.frames(&arguments.scene);
     path::check(arguments, frames)?;
     let files = path::outputs(arguments, frames);
     let film = Some(arguments.output.as_path()).filter(|path| path::is_film(path, frames));
     check_files(&files, film.filter(|path| !is_dash(path)), &source, &arguments.scene, arguments.force)?;
-    Ok((arguments.scene.load(&source, !arguments.drop_unknown, watch)?, files))
-}
-
-/// The virtual view `frame` of a list or path; 0 if there is one.
-fn render(
-    scene: &Scene,
-    frame: usize,
-    arguments: &RenderArguments,
-    watch: Watch<'_>,
-) -> Result<Rendered, Failure> {
-    let settings = arguments.settings(scene.offset);
-    let whole = |rendering| Rendered { rendering, hull: None, geometry: None };
-    match &scene.kind {
-        Kind::Rectified { views, positions } => {
-            let views: Vec<_> = views.iter().map(SourceView::view).collect();
-            let done = rectified::render_watched(&views, positions[frame], &settings, watch);
-            done.map(|rendering| whole(outputs::in_millimetres(rendering, scene))).map_err(failed)
-        }
-        Kind::Calibrated { views, cameras, size } => {
-            let views: Vec<_> = views.iter().map(SourceView::view).collect();
-            let done = calibrated::render_watched(&views, &cameras[frame], *size, &settings, watch);
-            done.map(whole).map_err(failed)
-        }
-        Kind::Uncalibrated { images, tracks, targets, size } => {
-            let images: Vec<&Image> = images.iter().collect();
-            let seed = arguments.seed.unwrap_or(UncalibratedSettings::default().seed);
-            let special = UncalibratedSettings { seed, reverse_order: arguments.reverse_order };
-            let done =
-                uncalibrated::render(&images, tracks, &targets[frame], *size, &settings, &special, watch)
-                    .map_err(failed)?;
-            let geometry = Some(done.geometry);
-            Ok(Rendered { rendering: done.rendering, hull: Some(done.region), geometry })
-        }
-    }
+    Ok((arguments.scene.load(&source, arguments.unknown, arguments.nearest)?, files))
 }
 
 /// Figures of merit over the region of the rendering, and over the whole image if the two differ.

@@ -5,8 +5,8 @@ use super::failure::{Failure, PROGRAM, failed, usage};
 use super::inputs;
 use crate::files;
 use crate::image::{Image, read_image};
-use crate::pipeline::{RenderSettings, Watch};
-use crate::scene::{self, Kind, LoadOptions, Scene, SceneSpec};
+use crate::pipeline::RenderSettings;
+use crate::scene::{self, Kind, LoadOptions, Scene, SceneSpec, TargetSpec, Unknown, ViewSpec};
 use hybank_core::messages::Quoted;
 use hybank_program::is_dash;
 use std::path::{Path, PathBuf};
@@ -38,22 +38,38 @@ impl SceneArguments {
         self.truth.as_deref().map(read).transpose().map_err(failed)
     }
 
-    /// Reads the scene file, with the views that other files list.
-    pub(super) fn source(&self) -> Result<Source, Failure> {
-        let (path, spec) = spec(&self.file)?;
+    /// Reads the scene file, with the views that other files list; the virtual views are those of a list of
+    /// `cameras` if it is given.
+    pub(super) fn source(&self, cameras: Option<&Path>) -> Result<Source, Failure> {
+        let (path, mut spec) = spec(&self.file)?;
+        if let Some(cameras) = cameras {
+            let cameras = Some(std::path::absolute(cameras).unwrap_or_else(|_| cameras.into()));
+            spec.targets = vec![TargetSpec { cameras, ..TargetSpec::default() }];
+        }
         let spec = scene::complete(&spec, &path).map_err(failed)?;
         Ok(Source { path, spec })
     }
 
-    /// Loads the scene, and prints what was decided on the way.
-    pub(super) fn load(&self, source: &Source, fill: bool, watch: Watch<'_>) -> Result<Scene, Failure> {
-        let options = LoadOptions {
+    /// How the scene is read.
+    pub(super) fn options(&self) -> LoadOptions {
+        LoadOptions {
             view: self.view.clone(),
             depth_step: self.depth_step,
-            fill,
+            keep_cameras: self.keep_cameras,
             max_pixels: self.max_pixels,
-        };
-        let scene = scene::load(&source.spec, &source.path, &options, watch).map_err(failed)?;
+            ..LoadOptions::default()
+        }
+    }
+
+    /// Loads the scene, and prints what was decided on the way.
+    pub(super) fn load(
+        &self,
+        source: &Source,
+        unknown: Option<Unknown>,
+        nearest: Option<usize>,
+    ) -> Result<Scene, Failure> {
+        let options = LoadOptions { unknown, nearest, ..self.options() };
+        let scene = scene::load(&source.spec, &source.path, &options).map_err(failed)?;
         inputs::notes(&scene);
         Ok(scene)
     }
@@ -80,6 +96,17 @@ impl Source {
         if arguments.view.is_some() { 1 } else { self.spec.frames().clamp(1, scene::MOST_FRAMES) }
     }
 
+    /// The scene file.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The photograph of a view, and its pixels that show no part of the scene.
+    pub(super) fn photograph(&self, view: &ViewSpec, most: usize) -> Result<(Image, Vec<bool>), Failure> {
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        scene::photograph(view, folder, most).map_err(failed)
+    }
+
     /// The scene file, and every file that it names.
     pub(super) fn files(&self) -> Vec<PathBuf> {
         let mut files = self.spec.files(self.path.parent().unwrap_or(Path::new("")));
@@ -103,7 +130,7 @@ fn spec(path: &Path) -> Result<(PathBuf, SceneSpec), Failure> {
     if let Some(folder) = folder {
         let own = folder.join("scene.toml");
         if !(path.is_dir() && own.is_file()) {
-            let scene = scene::describe(&[path.to_owned()], folder).map_err(failed)?;
+            let scene = scene::describe(&[path.to_owned()], None, folder).map_err(failed)?;
             return Ok((folder.join("<scene>"), scene.spec));
         }
         PROGRAM.say_line(&format!("note: the scene of this folder is {}", Quoted(&own)));

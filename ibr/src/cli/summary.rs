@@ -23,8 +23,6 @@ pub(super) struct Summary {
     pub(super) preparation_seconds: f64,
     /// The views that were used, by number from 0.
     pub(super) views: Vec<usize>,
-    /// Error in grey levels that is white in the picture of --error.
-    pub(super) error_white: Option<f32>,
     pub(super) samples: Report,
     pub(super) holes: HoleCount,
     /// Unknown depths filled before propagation.
@@ -41,7 +39,7 @@ pub(super) struct Summary {
     pub(super) agreement: Agreement,
     pub(super) geometry: Option<GeometryReport>,
     /// What the numbers in the file of --depth are.
-    pub(super) depths: Option<String>,
+    pub(super) depths: Option<&'static str>,
 }
 
 impl Summary {
@@ -78,9 +76,6 @@ impl Summary {
                 "PSNR      {psnr:.2} dB   SSIM {ssim:.4}   MAE {mae:.3}   (on the {})",
                 self.compared_on
             ));
-        }
-        if let Some(white) = self.error_white {
-            lines.push(format!("error     white is {white:.1} grey levels"));
         }
         lines.push(format!("coverage  {:.2} %", 100.0 * self.coverage));
         lines.extend(self.counts());

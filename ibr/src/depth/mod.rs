@@ -1,6 +1,7 @@
 //! Depth and disparity maps: one value per pixel, NaN where unknown.
 
 mod fill;
+mod mesh;
 mod relief;
 
 use crate::lanes::bounds;
@@ -8,6 +9,7 @@ use crate::setting::{PIXELS, SCALE, STEP, SettingError};
 pub(crate) use fill::fill_empty_rows;
 pub use fill::fill_unknown;
 pub(crate) use fill::{NONE, for_holes};
+pub(crate) use mesh::Mesh;
 pub(crate) use relief::{JUMP, Reliefs, TILE};
 
 /// The quantity that a map holds.
@@ -91,6 +93,9 @@ const FAR_FROM: f32 = 5e9;
 pub(crate) fn or_far(depth: f64) -> f64 {
     if depth >= f64::from(FAR_FROM) { f64::from(FAR) } else { depth }
 }
+
+/// Largest share of the pixels that have scattered values; with more a map is one with holes.
+const MOST_SCATTERED: f64 = 0.5;
 
 /// Where a depth comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -239,11 +244,16 @@ impl DepthMap {
 
     /// The median of about a thousand evenly spaced values; none if they are unknown or far away.
     pub fn middle(&self) -> Option<f32> {
+        self.quantile(0.5)
+    }
+
+    /// The value below which this share of about a thousand evenly spaced ones lies.
+    pub(crate) fn quantile(&self, share: f64) -> Option<f32> {
         let step = self.data.len().div_ceil(1000).max(1);
         let near = self.data.iter().copied().step_by(step).filter(|v| *v < FAR);
         let mut known: Vec<f32> = near.collect();
         known.sort_by(f32::total_cmp);
-        known.get(known.len() / 2).copied()
+        known.get((share * known.len() as f64) as usize).copied()
     }
 
     /// Every `step`-th value in both directions, from the first, as from a coarse sensor.
@@ -261,8 +271,8 @@ impl DepthMap {
         Ok(self.with_values(size, data))
     }
 
-    /// Whether the known values lie apart, as points of a lidar do: fewer than half of them have neighbours
-    /// to the right and below, where the map goes on.
+    /// Whether the known values lie apart, as points of a lidar do: few of the pixels have one, and fewer
+    /// than half of these have neighbours to the right and below, where the map goes on.
     pub(crate) fn is_scattered(&self) -> bool {
         let is_known = |p: usize| self.data.get(p).is_none_or(|v| !v.is_nan());
         let is_joined = |p: &usize| {
@@ -270,7 +280,8 @@ impl DepthMap {
             (is_last || is_known(p + 1)) && is_known(p + self.width)
         };
         let known = || (0..self.data.len()).filter(|p| is_known(*p));
-        2 * known().filter(is_joined).count() < known().count()
+        let is_thin = known().count() as f64 <= MOST_SCATTERED * self.data.len() as f64;
+        is_thin && 2 * known().filter(is_joined).count() < known().count()
     }
 
     /// Refuses a map whose size does not fit an image of `size` with one value every `step` pixels.
@@ -298,6 +309,34 @@ impl DepthMap {
         let (mut map, offset) = (self.clone(), self.offset as f32);
         map.data.iter_mut().for_each(|v| *v = change(*v).max(0.1 * *v - 0.9 * offset));
         map
+    }
+
+    /// Takes the depths of pixels away; how many of them were guesses, and how many far away.
+    pub(crate) fn forget(&mut self, pixels: &[bool]) -> (usize, usize) {
+        let (mut guesses, mut far) = (0, 0);
+        for p in (0..self.data.len()).filter(|p| pixels.get(*p) == Some(&true)) {
+            guesses += usize::from(self.is_guessed(p));
+            far += usize::from(self.measure == Measure::Depth && self.data[p] >= FAR);
+            self.data[p] = f32::NAN;
+            if let Some(origin) = self.origins.get_mut(p) {
+                *origin = Origin::Known;
+            }
+        }
+        (guesses, far)
+    }
+
+    /// Takes pixels as far away; the parallax of disparities is next to nothing there.
+    pub(crate) fn set_far(&mut self, pixels: &[usize]) {
+        let value = match self.measure {
+            Measure::Depth => FAR,
+            Measure::Disparity => (f64::from(1.0 / FAR) - self.offset) as f32,
+        };
+        for p in pixels {
+            self.data[*p] = value;
+            if let Some(origin) = self.origins.get_mut(*p) {
+                *origin = Origin::Known;
+            }
+        }
     }
 
     /// The same map, in which values have the origin that they have in another one, and some more this one.
@@ -369,6 +408,16 @@ mod tests {
         assert_eq!(DepthMap::new((4, 1), stored, 2.0, Measure::Depth).unwrap().unknown(), 3);
         let marked = vec![8.0, -1.0, -1.0, 3.0];
         assert_eq!(DepthMap::new((4, 1), marked, 1.0, Measure::Disparity).unwrap().unknown(), 2);
+    }
+
+    /// Three tenths of the values are missing at random: a map with holes, not a lidar.
+    #[test]
+    fn a_map_with_holes_is_not_scattered() {
+        let with = |share: usize| {
+            let value = |p: usize| if p * 7919 % 100 < share { 5.0 } else { 0.0 };
+            DepthMap::new((60, 50), (0..3000).map(value).collect(), 1.0, Measure::Depth).unwrap()
+        };
+        assert!(!with(70).is_scattered() && with(10).is_scattered());
     }
 
     #[test]

@@ -1,8 +1,10 @@
 //! The shape of a depth map around a pixel: its slopes, and whether a nearer surface ends beside it.
 
 use super::{DepthMap, Measure};
+use crate::occlusion::DepthTest;
 
-/// A difference of this share of the nearer depth separates two surfaces: the depth test's default sigma.
+/// A difference of this share of the nearer depth separates two surfaces of maps without noise: the depth
+/// test's default sigma.
 pub(crate) const JUMP: f32 = 0.05;
 
 /// Pixels of a row whose surroundings are found together.
@@ -15,6 +17,9 @@ struct Scale {
     nearer: f32,
     /// Added to a value, it gives a positive number in proportion or inverse proportion to depth.
     offset: f32,
+    /// Share of the nearer depth, and difference of disparities, that separate two surfaces.
+    relative: f32,
+    parallax: f32,
 }
 
 /// The surroundings of some neighbouring pixels, in the order of their columns: arrays of a fixed length,
@@ -35,11 +40,12 @@ pub(crate) struct Reliefs {
 impl DepthMap {
     /// Whether one of the four neighbours of a pixel lies on a nearer surface.
     pub fn is_behind_edge(&self, x: usize, y: usize) -> bool {
-        self.reliefs(x, y).behind_edge[0]
+        self.reliefs(x, y, &DepthTest::default()).behind_edge[0]
     }
 
-    /// The surroundings of the pixels of a row from this column on, up to the end of the row or a tile.
-    pub(crate) fn reliefs(&self, start: usize, y: usize) -> Reliefs {
+    /// The surroundings of the pixels of a row from this column on, up to the end of the row or a tile. What
+    /// may hide another sample by the depth test lies on another surface.
+    pub(crate) fn reliefs(&self, start: usize, y: usize, test: &DepthTest) -> Reliefs {
         // NaN outside the map.
         let tile = |row: Option<usize>, start: usize| {
             let mut values = [f32::NAN; TILE];
@@ -58,7 +64,7 @@ impl DepthMap {
         }
         let (across, down) = ([0.0; TILE], [0.0; TILE]);
         let mut reliefs = Reliefs { across, down, behind_edge: [false; TILE], outline: [false; TILE] };
-        let scale = Scale::of(self);
+        let scale = Scale::of(self, test);
         for i in 0..TILE {
             reliefs.across[i] = scale.slope(left[i], here[i], right[i]);
             reliefs.down[i] = scale.slope(above[i], here[i], below[i]);
@@ -73,9 +79,10 @@ impl DepthMap {
 }
 
 impl Scale {
-    fn of(map: &DepthMap) -> Self {
-        let nearer = if map.measure == Measure::Disparity { 1.0 } else { -1.0 };
-        Self { nearer, offset: map.offset as f32 }
+    fn of(map: &DepthMap, test: &DepthTest) -> Self {
+        let (nearer, parallax) =
+            if map.measure == Measure::Disparity { (1.0, test.parallax as f32) } else { (-1.0, 0.0) };
+        Self { nearer, offset: map.offset as f32, relative: test.relative as f32, parallax }
     }
 
     /// The least difference of two values that separates their surfaces.
@@ -84,7 +91,8 @@ impl Scale {
     /// the smaller disparity.
     #[inline(always)]
     fn jump(self, a: f32, b: f32) -> f32 {
-        JUMP * ((if a < b { a } else { b }) + self.offset)
+        let share = self.relative * ((if a < b { a } else { b }) + self.offset);
+        if share > self.parallax { share } else { self.parallax }
     }
 
     /// Mean of the differences to the neighbours on the surface of `here`; unknown neighbours have none.
@@ -129,9 +137,22 @@ mod tests {
         assert!(!map.is_behind_edge(4, 1));
     }
 
+    /// Errors of disparities that the depth test allows for are no edges.
+    #[test]
+    fn noise_is_no_edge() {
+        let data = (0..60).map(|i| 6.0 + [0.0, 0.8, -0.7, 0.3][(i * 7 + i / 20) % 4]).collect();
+        let map = DepthMap::new((20, 3), data, 1.0, Measure::Disparity).unwrap();
+        let edges = |parallax: f64| {
+            let test = DepthTest { parallax, ..DepthTest::default() };
+            let row = map.reliefs(0, 1, &test);
+            row.behind_edge[..20].iter().filter(|edge| **edge).count()
+        };
+        assert!(edges(0.0) > 5 && edges(2.0) == 0, "{} {}", edges(0.0), edges(2.0));
+    }
+
     /// Slopes across and down, behind an edge, on an outline.
     fn relief(map: &DepthMap, x: usize, y: usize) -> (f32, f32, bool, bool) {
-        let Reliefs { across, down, behind_edge, outline } = map.reliefs(x, y);
+        let Reliefs { across, down, behind_edge, outline } = map.reliefs(x, y, &DepthTest::default());
         (across[0], down[0], behind_edge[0], outline[0])
     }
 
@@ -149,7 +170,7 @@ mod tests {
             for (x, y) in (0..width * height).map(|p| (p % width, p / width)) {
                 if !map.row(y)[x].is_nan() {
                     let i = x % TILE;
-                    let all = map.reliefs(x - i, y);
+                    let all = map.reliefs(x - i, y, &DepthTest::default());
                     let of_tile = (all.across[i], all.down[i], all.behind_edge[i], all.outline[i]);
                     assert_eq!(of_tile, relief(&map, x, y), "{measure:?} {x} {y}");
                 }

@@ -3,7 +3,6 @@
 mod colmap_map;
 mod dynamic;
 mod float;
-mod frame_rate;
 pub mod pfm;
 pub mod quality;
 mod read;
@@ -13,11 +12,11 @@ mod write;
 pub mod y4m;
 
 pub use dynamic::Levels;
-pub use frame_rate::FrameRate;
-pub(crate) use read::image_size;
 pub use read::{MOST_PIXELS, read_image, read_map};
+pub(crate) use read::{image_size, read_photograph};
 pub use texture::Texture;
-pub use write::{begin, encode, encode_with_alpha, save};
+pub(crate) use write::write_file;
+pub use write::{encode, encode_with_alpha, save};
 
 use crate::files::InputError;
 
@@ -127,6 +126,29 @@ impl Image {
         along(here) * (1.0 - b) + along(here + below) * b
     }
 
+    /// A channel at a position, by cubic interpolation between pixels and linear beside the border; NaN
+    /// outside.
+    #[inline]
+    pub(crate) fn cubic_at(&self, x: f64, y: f64, channel: usize) -> f32 {
+        if !(x >= 1.0 && y >= 1.0 && x < self.width as f64 - 2.0 && y < self.height as f64 - 2.0) {
+            return self.value_at(x, y, channel);
+        }
+        let (column, row) = (x as usize, y as usize);
+        let (across, down) = (cubic_weights(x.fract() as f32), cubic_weights(y.fract() as f32));
+        let first = ((row - 1) * self.width + column - 1) * self.channels + channel;
+        let of_row = |k: usize| {
+            let start = first + k * self.width * self.channels;
+            (0..4).map(|i| across[i] * self.data[start + i * self.channels]).sum::<f32>()
+        };
+        (0..4).map(|k| down[k] * of_row(k)).sum()
+    }
+
+    /// The image after half a turn.
+    pub(crate) fn turned(&self) -> Self {
+        let data = self.data.chunks_exact(self.channels).rev().flatten().copied().collect();
+        Self { data, ..*self }
+    }
+
     /// The same image with three channels.
     pub fn to_rgb(&self) -> Self {
         if self.channels == 3 {
@@ -177,6 +199,17 @@ impl Image {
     }
 }
 
+/// Weights of the four pixels around a place, 0 to 1 beyond the second: cubic interpolation of Catmull and
+/// Rom.
+pub(crate) fn cubic_weights(t: f32) -> [f32; 4] {
+    [
+        t * (t * (2.0 - t) - 1.0) / 2.0,
+        (t * t * (3.0 * t - 5.0) + 2.0) / 2.0,
+        t * (t * (4.0 - 3.0 * t) + 1.0) / 2.0,
+        t * t * (t - 1.0) / 2.0,
+    ]
+}
+
 /// Rounds half up into 0..=255; NaN becomes 0.
 #[inline]
 pub(crate) fn to_byte(value: f32) -> u8 {
@@ -214,6 +247,19 @@ mod tests {
         let back = grey.to_rgb().to_grey();
         assert!(back.data().iter().zip(grey.data()).all(|(a, b)| (a - b).abs() < 1e-4));
         assert_eq!(grey.pixel::<3>(1), [20.0; 3]);
+    }
+
+    /// Quadratic polynomials are interpolated exactly, and pixels have their values.
+    #[test]
+    fn cubic_interpolation_is_right_to_the_second_order() {
+        let value = |x: f64, y: f64| 3.0 + 0.5 * x * x - 0.3 * x * y + 0.2 * y * y;
+        let data = (0..10 * 9).map(|p| value(f64::from(p % 10), f64::from(p / 10)) as f32).collect();
+        let image = Image::new(10, 9, 1, data).unwrap();
+        for (x, y) in [(3.3, 4.7), (1.0, 1.0), (7.9, 6.5), (5.0, 2.25)] {
+            assert!((f64::from(image.cubic_at(x, y, 0)) - value(x, y)).abs() < 1e-4, "{x} {y}");
+        }
+        assert!((image.cubic_at(0.5, 3.0, 0) - image.value_at(0.5, 3.0, 0)).abs() < 1e-6);
+        assert!(image.cubic_at(-0.1, 3.0, 0).is_nan());
     }
 
     #[test]

@@ -21,6 +21,16 @@ pub fn read_image(path: &Path, most: usize) -> Result<Image, InputError> {
     Ok(load(path, most)?.intensities())
 }
 
+/// The same with the pixels that are transparent; none are listed of an opaque image.
+///
+/// # Errors
+/// As [`read_image`].
+pub(crate) fn read_photograph(path: &Path, most: usize) -> Result<(Image, Vec<bool>), InputError> {
+    let mut stored = load(path, most)?;
+    let transparent = std::mem::take(&mut stored.transparent);
+    Ok((stored.intensities(), transparent))
+}
+
 /// Width and height of an image; its pixels are not unpacked where the format allows that.
 ///
 /// # Errors
@@ -64,6 +74,18 @@ pub(super) struct Stored {
     numbers: Image,
     /// The number that is white: 1 of floats.
     white: f32,
+    /// Pixels of which less than half is opaque; empty if there are none.
+    transparent: Vec<bool>,
+}
+
+/// Half of the largest number of 16 bits.
+const HALF: u16 = 1 << 15;
+
+fn transparent(picture: &DynamicImage) -> Vec<bool> {
+    let has_alpha = picture.color().has_alpha();
+    let pixels = has_alpha.then(|| picture.to_luma_alpha16());
+    let found: Vec<bool> = pixels.iter().flat_map(|image| image.pixels().map(|p| p.0[1] < HALF)).collect();
+    if found.contains(&true) { found } else { Vec::new() }
 }
 
 impl Stored {
@@ -81,7 +103,8 @@ impl Stored {
             (_, false, false) => (255.0, 1, numbers(picture.to_luma8().into_raw())),
             (_, false, true) => (255.0, 3, numbers(picture.to_rgb8().into_raw())),
         };
-        Ok(Self { numbers: Image::new(width, height, channels, data)?, white })
+        let numbers = Image::new(width, height, channels, data)?;
+        Ok(Self { numbers, white, transparent: transparent(picture) })
     }
 
     /// The image on the scale 0..255.
@@ -109,7 +132,7 @@ fn load(path: &Path, most: usize) -> Result<Stored, InputError> {
     let bytes = files::read_bytes(path, CHECK_THE_PATH)?;
     let source = Source { path, bytes: &bytes, most };
     if let Some(numbers) = float_map(&source)? {
-        return Ok(Stored { numbers, white: 1.0 });
+        return Ok(Stored { numbers, white: 1.0, transparent: Vec::new() });
     }
     let wrong = |e: image::ImageError| source.wrong(e.to_string());
     let open = || {

@@ -46,18 +46,14 @@ pub fn encode(image: &Image, path: &Path, levels: Levels) -> Result<Vec<u8>, Inp
 /// # Errors
 /// As [`encode`], and [`InputError::File`] if the system fails.
 pub fn save(image: &Image, path: &Path) -> Result<(), InputError> {
-    Ok(begin(&encode(image, path, Levels::Eight)?, path, true)?.commit()?)
+    write_file(&encode(image, path, Levels::Eight)?, path, true)
 }
 
-/// Writes bytes to a file without giving it its name yet: several of them are committed together by
-/// [`commit_all`](hybank_core::files::commit_all).
-///
-/// # Errors
-/// [`InputError`], also if the file exists and `replace` is not set.
-pub fn begin(bytes: &[u8], path: &Path, replace: bool) -> Result<AtomicFile, InputError> {
+/// Writes bytes to a file that appears when it is whole; one that exists is refused unless `replace` is set.
+pub(crate) fn write_file(bytes: &[u8], path: &Path, replace: bool) -> Result<(), InputError> {
     let mut file = AtomicFile::create(path, replace)?;
     file.write_all(bytes).map_err(|e| InputError::file(path, e))?;
-    Ok(file)
+    Ok(file.commit()?)
 }
 
 /// The bytes of a PNG file with an alpha channel, 0 to 1; colours are not multiplied by it. `path` appears

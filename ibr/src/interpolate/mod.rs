@@ -13,10 +13,6 @@ pub use holes::{Cover, HoleCount, HoleFill};
 use crate::occlusion::DepthTest;
 use crate::setting::{NOT_NEGATIVE, POSITIVE, SMOOTHING, SettingError};
 
-/// Called with the share of a piece of work that is done, 0 to 1, from any thread and not necessarily in
-/// order.
-pub type Watch<'a> = &'a (dyn Fn(f64) + Sync);
-
 /// Degree of the splines of the plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 #[non_exhaustive]

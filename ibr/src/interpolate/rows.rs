@@ -10,7 +10,6 @@ use super::holes::{GAP, reach};
 use super::{Cover, HoleFill, Settings};
 use crate::depth::{fill_empty_rows, for_holes};
 use crate::sample::Sample;
-use hybank_sampling::fit::Response;
 use hybank_sampling::{Fit, FitSample};
 
 /// Keeps the normal equations definite if lambda and tau are 0; negligible beside any other weight.
@@ -28,8 +27,6 @@ pub struct RowWork<const C: usize> {
     fit: Fit<ORDER, C>,
     smoothing: Vec<f64>,
     sums: Vec<(f64, f64)>,
-    /// Columns of the copies that fill holes.
-    fillers: Vec<f64>,
     width: usize,
 }
 
@@ -37,7 +34,7 @@ impl<const C: usize> RowWork<C> {
     /// For rows of `width` >= 1 pixels.
     pub fn new(width: usize) -> Self {
         let fit = Fit::covering(width.max(1) - 1);
-        Self { fit, smoothing: Vec::new(), sums: Vec::new(), fillers: Vec::new(), width }
+        Self { fit, smoothing: Vec::new(), sums: Vec::new(), width }
     }
 
     /// Interpolates one row from its visible samples, sorted by column.
@@ -57,7 +54,6 @@ impl<const C: usize> RowWork<C> {
         mask.fill(Cover::Disocclusion);
         let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return Ok(false) };
         self.fit.clear();
-        self.fillers.clear();
         self.weigh(samples, settings);
         self.fit.add_all(samples.iter().zip(&self.smoothing).map(|(s, v)| FitSample {
             x: s.x,
@@ -86,22 +82,6 @@ impl<const C: usize> RowWork<C> {
             blacken(mask, values, C);
         }
         Ok(true)
-    }
-
-    /// The fitted row at any column; meaningful after [`RowWork::interpolate`].
-    pub fn value(&self, x: f64) -> [f64; C] {
-        self.fit.value(x)
-    }
-
-    /// How much samples count at a column, with the equations that the last call of
-    /// [`RowWork::interpolate`] solved.
-    pub fn respond(&self, x: f64, response: &mut Response) {
-        self.fit.respond(x, response);
-    }
-
-    /// Columns of the samples of weight one that the last call of [`RowWork::interpolate`] put into holes.
-    pub fn fillers(&self) -> &[f64] {
-        &self.fillers
     }
 
     /// V_s of every sample, from the variance of the depth within max(epsilon, 1 px).
@@ -158,7 +138,6 @@ impl<const C: usize> RowWork<C> {
         for k in 1..parts as usize {
             let x = from + (to - from) * k as f64 / parts;
             self.fit.add(x, &value, 1.0, settings.fit.lambda);
-            self.fillers.push(x);
         }
     }
 }

@@ -41,6 +41,9 @@ pub enum MatchError {
 /// Other photographs with which each one is matched: the nearest.
 const OTHERS: usize = 2;
 
+/// Least distance of two photographs that are matched, as a share of the median distance.
+const LEAST_BASELINE: f64 = 0.02;
+
 /// The part of their sides that the photographs have when the range is looked for.
 const REDUCTION: usize = 4;
 
@@ -70,15 +73,16 @@ struct Sweep<P> {
     range: Range<i32>,
 }
 
-/// Maps of photographs of one kind, unknown where no other photograph shows the point: disparities in pixels
-/// for a baseline of one, or depths in the unit of the cameras.
+/// Maps of the `wanted` ones of photographs of one kind, unknown where no other photograph shows the point:
+/// disparities in pixels for a baseline of one, or depths in the unit of the cameras.
 ///
 /// # Errors
 /// [`MatchError`].
 pub fn depths<P: Viewpoint>(
     photographs: &[Photograph<'_, P>],
     measure: Measure,
-) -> Result<Vec<DepthMap>, MatchError> {
+    wanted: &[bool],
+) -> Result<Vec<Option<DepthMap>>, MatchError> {
     let sweeps = |by| {
         let reduced = |p: &Photograph<'_, P>| (p.camera.reduced(by), p.image.to_grey().reduced(by));
         let sweep =
@@ -86,20 +90,28 @@ pub fn depths<P: Viewpoint>(
         let mut sweeps: Vec<_> = photographs.iter().map(reduced).map(sweep).collect();
         (0..sweeps.len()).try_for_each(|k| Sweep::prepare(&mut sweeps, k)).map(|()| sweeps)
     };
-    let coarse = matched(&sweeps(REDUCTION)?)?;
+    let coarse = matched(&sweeps(REDUCTION)?, &vec![true; wanted.len()])?;
     let mut fine = sweeps(1)?;
     fine.iter_mut().zip(&coarse).for_each(|(sweep, found)| sweep.narrow(found));
     let map = |(sweep, found): (&Sweep<P>, Vec<f32>)| {
-        let data = found.into_iter().map(|v| measure.of_parallax(v)).collect();
-        DepthMap::from_known(sweep.grey.size(), data, measure)
+        let data: Vec<f32> = found.into_iter().map(|v| measure.of_parallax(v)).collect();
+        (!data.is_empty()).then(|| DepthMap::from_known(sweep.grey.size(), data, measure))
     };
-    Ok(fine.iter().zip(matched(&fine)?).map(map).collect())
+    Ok(fine.iter().zip(matched(&fine, wanted)?).map(map).collect())
 }
 
-/// The parallaxes of all photographs, NaN where no other one has the same at the point.
-fn matched<P: Viewpoint>(sweeps: &[Sweep<P>]) -> Result<Vec<Vec<f32>>, MatchError> {
-    let found: Vec<Vec<f32>> = sweeps.iter().map(|sweep| sweep.parallaxes(sweeps)).collect();
+/// The parallaxes of the wanted photographs, NaN where no other one has the same at the point; those of the
+/// rest are empty.
+fn matched<P: Viewpoint>(sweeps: &[Sweep<P>], wanted: &[bool]) -> Result<Vec<Vec<f32>>, MatchError> {
+    let asked = |k: usize| {
+        wanted[k] || sweeps.iter().zip(wanted).any(|(sweep, wanted)| *wanted && sweep.others.contains(&k))
+    };
+    let of = |k: usize| if asked(k) { sweeps[k].parallaxes(sweeps) } else { Vec::new() };
+    let found: Vec<Vec<f32>> = (0..sweeps.len()).map(of).collect();
     let confirmed = (0..sweeps.len()).map(|k| {
+        if !wanted[k] {
+            return Ok(Vec::new());
+        }
         let values = sweeps[k].confirmed(sweeps, &found, k);
         let known = values.iter().filter(|v| !v.is_nan()).count();
         let is_alike = known as f64 > LEAST_SHARE * values.len() as f64;
@@ -108,22 +120,24 @@ fn matched<P: Viewpoint>(sweeps: &[Sweep<P>]) -> Result<Vec<Vec<f32>>, MatchErro
     confirmed.collect()
 }
 
-/// The indices of the [`OTHERS`] smallest distances above 0, and of fewer if there are fewer. There may be
-/// thousands of photographs, so no more is kept.
-fn nearest(distances: impl Iterator<Item = f64>) -> Vec<usize> {
-    let mut found: Vec<(f64, usize)> = Vec::with_capacity(OTHERS + 1);
-    for (index, distance) in distances.enumerate().filter(|(_, distance)| *distance > 0.0) {
-        found.insert(found.partition_point(|(nearer, _)| *nearer <= distance), (distance, index));
-        found.truncate(OTHERS);
-    }
-    found.into_iter().map(|(_, index)| index).collect()
+/// The indices of the [`OTHERS`] smallest distances, and of fewer if there are fewer. Photographs from
+/// nearly one place do not show depth, so a distance that is far below the usual one does not count.
+fn nearest(distances: &[f64]) -> Vec<usize> {
+    let mut sorted: Vec<f64> = distances.iter().copied().filter(|distance| *distance > 0.0).collect();
+    sorted.sort_by(f64::total_cmp);
+    let least = sorted.get(sorted.len().saturating_sub(1) / 2).map_or(0.0, |middle| LEAST_BASELINE * middle);
+    let mut found: Vec<usize> = (0..distances.len()).filter(|k| distances[*k] > least).collect();
+    found.sort_by(|a, b| distances[*a].total_cmp(&distances[*b]));
+    found.truncate(OTHERS);
+    found
 }
 
 impl<P: Viewpoint> Sweep<P> {
     /// Finds the nearest other photographs, and takes the widest range.
     fn prepare(sweeps: &mut [Self], index: usize) -> Result<(), MatchError> {
         let sweep = &sweeps[index];
-        let others = nearest(sweeps.iter().map(|other| sweep.camera.distance(&other.camera)));
+        let distances: Vec<f64> = sweeps.iter().map(|other| sweep.camera.distance(&other.camera)).collect();
+        let others = nearest(&distances);
         let shift = others.iter().map(|k| sweep.shift(&sweeps[*k].camera)).fold(0.0, f64::max);
         let pixels = |share: f64| (share * sweep.grey.width() as f64) as i32;
         let (low, widest) = match sweep.measure {

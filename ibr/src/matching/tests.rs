@@ -8,6 +8,26 @@ fn cameras() -> [Camera; 3] {
     [0.0, 1.0, 2.0].map(|position| Camera::metric(rig_camera(position, SIZE), false).unwrap())
 }
 
+/// The maps of all photographs.
+fn depths<P: Viewpoint>(
+    photographs: &[Photograph<'_, P>],
+    measure: Measure,
+) -> Result<Vec<DepthMap>, MatchError> {
+    let found = super::depths(photographs, measure, &vec![true; photographs.len()])?;
+    Ok(found.into_iter().flatten().collect())
+}
+
+/// One that is wanted has the map that it has among all.
+#[test]
+fn the_map_of_one_photograph_is_found() {
+    let cameras = cameras();
+    let shots = cameras.map(|camera| SyntheticScene::default().view(&camera, SIZE));
+    let views = [0, 1, 2].map(|k| Photograph { image: &shots[k].0, camera: cameras[k] });
+    let one = super::depths(&views, Measure::Depth, &[false, true, false]).unwrap();
+    let all = depths(&views, Measure::Depth).unwrap();
+    assert!(one[0].is_none() && one[2].is_none() && one[1].as_ref() == Some(&all[1]));
+}
+
 /// Median of the differences of known values, and their share.
 fn errors(found: &DepthMap, truth: &DepthMap, measure: Measure) -> (f32, f64) {
     let values = found.data().iter().zip(truth.data()).filter(|(f, _)| !f.is_nan());
@@ -60,18 +80,10 @@ fn photographs_that_cannot_be_matched_are_named() {
     assert!(matches!(depths(&views, Measure::Disparity), Err(MatchError::Unlike(_))));
 }
 
-/// As sorting all of them gives, with the first of equal ones first, and in no more memory for more of them.
+/// The nearest of all, but none from nearly the same place.
 #[test]
-fn the_nearest_are_kept_and_nothing_else() {
-    let distances = |count: usize| (0..count).map(|i| (i * 7919 % 1013) as f64);
-    for count in [0, 1, 2, 3, 50, 5000] {
-        let values: Vec<f64> = distances(count).collect();
-        let mut sorted: Vec<usize> = (0..count).filter(|i| values[*i] > 0.0).collect();
-        sorted.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
-        sorted.truncate(OTHERS);
-        assert_eq!(nearest(distances(count)), sorted, "{count}");
-        // The list of pairs becomes that of the indices in its place, in which twice as many have room.
-        assert!(nearest(distances(count)).capacity() <= 2 * (OTHERS + 1));
-    }
-    assert_eq!(nearest([f64::NAN, f64::INFINITY, 0.0, 2.0].into_iter()), [3, 1]);
+fn the_nearest_with_a_baseline_are_matched() {
+    assert_eq!(nearest(&[0.0, 3.0, 0.001, 1.1, 1.0]), [4, 3]);
+    assert_eq!(nearest(&[f64::NAN, f64::INFINITY, 0.0, 2.0]), [3, 1]);
+    assert!(nearest(&[0.0, 0.0]).is_empty());
 }

@@ -6,7 +6,6 @@
 
 use super::DepthTest;
 use super::points::{Points, RUN};
-use crate::depth::Origin;
 use crate::lanes::{bounds, largest, least};
 use std::ops::Range;
 
@@ -182,8 +181,7 @@ impl Cells {
             let mut far = f32::NEG_INFINITY;
             self.each_cell(run, |cell| far = largest(far, self.far[cell]));
             if hides(run.near, far) {
-                let may_hide =
-                    |i: &usize| points.origin[*i] != Origin::Filled && hides(points.depth[*i], far);
+                let may_hide = |i: &usize| points.hides[*i] && hides(points.depth[*i], far);
                 (k * RUN..(k + 1) * RUN).filter(may_hide).for_each(&mut with);
             }
         }

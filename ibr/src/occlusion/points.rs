@@ -18,8 +18,9 @@ pub(crate) struct Points {
     pub(crate) spacing: Vec<f32>,
     /// Whether the depth test decides on the sample. The others may hide it and are not looked at.
     pub(crate) own: Vec<bool>,
-    /// Where the depth comes from.
-    pub(crate) origin: Vec<Origin>,
+    /// Whether it may hide others: not where its depth was filled in, and where its view has no share in the
+    /// place.
+    pub(crate) hides: Vec<bool>,
 }
 
 impl Points {
@@ -36,7 +37,7 @@ impl Points {
         self.y.extend(samples.clone().map(|s| s.y));
         self.depth.extend(samples.clone().map(|s| s.depth));
         self.spacing.extend(samples.clone().map(|s| s.spacing));
-        self.origin.extend(samples.map(|s| s.origin));
+        self.hides.extend(samples.map(|s| s.origin != Origin::Filled));
         self.own.resize(self.x.len(), true);
         self.resize(self.x.len().next_multiple_of(RUN));
     }
@@ -52,6 +53,6 @@ impl Points {
         self.depth.resize(count, f32::NAN);
         self.spacing.resize(count, f32::NAN);
         self.own.resize(count, false);
-        self.origin.resize(count, Origin::Known);
+        self.hides.resize(count, false);
     }
 }

@@ -3,10 +3,11 @@
 
 use super::Exposure;
 use super::depth_errors::{self, FEWEST_POINTS, Lookups};
-use crate::depth::{DepthMap, JUMP, Measure};
+use crate::depth::{DepthMap, FAR, JUMP, Measure};
 use crate::image::Texture;
 use crate::propagate::{View, Viewpoint, nearest};
 use rayon::prelude::*;
+use std::fmt;
 
 /// Pixels of each view that are compared, about.
 const COMPARED_PIXELS: usize = 20_000;
@@ -49,6 +50,17 @@ impl PairAgreement {
     }
 }
 
+impl fmt::Display for PairAgreement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ([first, second], percent) = (self.views.map(|view| view + 1), 100.0 * self.share);
+        let points = self.points;
+        write!(
+            f,
+            "views {first} and {second} agree in depth and colour at only {percent:.0} % of {points} points"
+        )
+    }
+}
+
 /// The agreement of all views, each with the closest of those before it.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
 pub struct Agreement {
@@ -59,7 +71,7 @@ pub struct Agreement {
     /// Noise and slopes of each photograph, where it shows them.
     pub textures: Vec<Option<Texture>>,
     /// Standard deviation of the independent errors of each map: pixels of disparity for a baseline of one,
-    /// or shares of the depth. Empty where a view shares too few points with another.
+    /// or shares of the depth. 0 where a view shares too few points with another.
     pub depth_errors: Vec<f64>,
 }
 
@@ -68,29 +80,33 @@ impl Agreement {
     pub fn of<P: Viewpoint>(views: &[View<'_, P>]) -> Self {
         let textures = views.par_iter().map(|view| Texture::of(view.image)).collect();
         let mut agreement = Self { gains: vec![[1.0; 3]; views.len()], textures, ..Self::default() };
-        // Of each view those of good pairs, and of poor ones.
-        let mut errors = vec![[Vec::new(), Vec::new()]; views.len()];
-        for j in 1..views.len() {
-            let Some(i) = nearest(views, j, 0..j) else { continue };
-            let found = Comparison::new(&views[i], &views[j]).verdict([i, j]);
-            let Some(pair) = found else { continue };
-            // Colours at points that do not correspond say nothing.
-            let gain = if pair.is_poor() { [1.0; 3] } else { pair.gain };
-            agreement.gains[j] = std::array::from_fn(|c| agreement.gains[i][c] / gain[c]);
-            agreement.pairs.push(pair);
+        let compared = |j: usize| {
+            let i = nearest(views, j, 0..j)?;
+            let pair = Comparison::new(&views[i], &views[j]).verdict([i, j])?;
             let look =
                 |a: &View<'_, P>, b: &View<'_, P>| Lookups::of(a.map, b.map, a.camera.map_to(&b.camera));
             let lookups = [look(&views[i], &views[j]), look(&views[j], &views[i])];
-            if let Some(found) = depth_errors::of_each(lookups) {
-                let is_poor = usize::from(pair.is_poor());
-                [i, j].iter().zip(found).for_each(|(view, variance)| errors[*view][is_poor].push(variance));
+            Some((pair, depth_errors::of_each(lookups)))
+        };
+        let compared: Vec<_> = (1..views.len()).into_par_iter().filter_map(compared).collect();
+        // Of each view those of good pairs, and of poor ones.
+        let mut errors = vec![[Vec::new(), Vec::new()]; views.len()];
+        for (pair, variances) in compared {
+            let [i, j] = pair.views;
+            // Colours at points that do not correspond say nothing.
+            let gain = if pair.is_poor() { [1.0; 3] } else { pair.gain };
+            agreement.gains[j] = std::array::from_fn(|c| agreement.gains[i][c] / gain[c]);
+            let is_poor = usize::from(pair.is_poor());
+            for (view, variance) in pair.views.into_iter().zip(variances.into_iter().flatten()) {
+                errors[view][is_poor].push(variance);
             }
+            agreement.pairs.push(pair);
         }
         let deviation = |[good, poor]: &[Vec<f64>; 2]| {
             let found = if good.is_empty() { poor } else { good };
-            (!found.is_empty()).then(|| (found.iter().sum::<f64>() / found.len() as f64).sqrt())
+            (found.iter().sum::<f64>() / found.len().max(1) as f64).sqrt()
         };
-        agreement.depth_errors = errors.iter().map(deviation).collect::<Option<_>>().unwrap_or_default();
+        agreement.depth_errors = errors.iter().map(deviation).collect();
         agreement
     }
 
@@ -151,10 +167,12 @@ impl Comparison {
             let mut all = Self { points: 0, matched: Vec::new(), is_grey };
             for x in (0..width).step_by(step) {
                 let (u, v, d) = to_second(x as f64, *y as f64, f64::from(first.map.row(*y)[x]));
-                // None for NaN, hence for pixels without depth.
+                // What is infinitely far away agrees whatever the depths are. None for NaN, hence for pixels
+                // without depth.
                 let Some(q) = other.pixel_at(u, v) else { continue };
                 let there = other_map.data()[q];
-                if there.is_nan() {
+                let is_far = other_map.measure() == Measure::Depth && there >= FAR && d >= f64::from(FAR);
+                if there.is_nan() || is_far {
                     continue;
                 }
                 all.points += 1;
@@ -298,6 +316,20 @@ mod tests {
         assert_eq!((three.groups(), alone.groups()), (vec![0, 0, 2], vec![0, 0]));
         assert_eq!(three.depth_errors[..2], alone.depth_errors[..]);
         assert!(three.depth_errors[2] > 10.0 * alone.depth_errors[1], "{:?}", three.depth_errors);
+    }
+
+    /// A view that shares nothing with the others leaves their errors as they are.
+    #[test]
+    fn a_view_apart_leaves_the_errors_of_the_others() {
+        let shots = [0.0, 1.0].map(record);
+        let disparities = shots.each_ref().map(|s| rig_disparity(&s.1, SIZE.0));
+        let dice = &mut crate::uncalibrated::random::dice::Dice::new(4);
+        let noisy = disparities.each_ref().map(|map| map.changed(|v| v + 0.5 * dice.normal() as f32));
+        let view = |i: usize, camera: f64| RectifiedView { image: &shots[i].0, map: &noisy[i], camera };
+        let alone = Agreement::of(&[view(0, 0.0), view(1, 1.0)]).depth_errors;
+        let apart = Agreement::of(&[view(0, 0.0), view(1, 1.0), view(0, 500.0)]).depth_errors;
+        assert_eq!((&apart[..2], apart[2]), (&alone[..], 0.0));
+        assert!(alone.iter().all(|error| (0.3..0.7).contains(error)), "{alone:?}");
     }
 
     #[test]

@@ -1,81 +1,87 @@
-//! A view from any number of calibrated cameras with depth.
+//! Virtual views of any number of calibrated cameras with depth. The first two stages run in bands of rows,
+//! and the third on the whole plane.
 
+use super::depth_errors::median;
+use super::nearness::{Nearness, Placed, choose};
+use super::shares::Shares;
 use super::{
-    Agreement, Method, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch, check_counts,
-    check_size,
+    Agreement, Geometry, RenderError, RenderSettings, Renderer, Rendering, Report, Stages, ViewWeights,
+    Visible, check_counts, check_size,
 };
 use crate::camera::Camera;
 use crate::depth::Measure;
 use crate::interpolate::Degree;
 use crate::interpolate::plane::PlaneProblem;
-use crate::occlusion::{DepthTest, PlaneSearch};
-use crate::propagate::{CalibratedView, Footprint, Frame};
-use crate::sample::Sample;
+use crate::occlusion::PlaneSearch;
+use crate::propagate::{CalibratedView, Footprint, Frame, Projected};
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Share of the first two stages in the work, about.
-const GATHERING: f64 = 0.7;
+/// Shares of the depths of a map that are nearer than those for which views are chosen.
+pub(crate) const QUARTILES: [f64; 2] = [0.25, 0.75];
 /// Samples held in memory at a time; larger scenes are rendered in bands of rows.
 const SAMPLES_AT_A_TIME: usize = 1 << 16;
 /// Fewest rows of a band, however many samples they have: neighbouring bands share some rows, whose samples
 /// are made twice.
 const FEWEST_ROWS: usize = 40;
 
-/// Renders the view of `camera` with `width` x `height` pixels.
-///
-/// # Errors
-/// [`RenderError`], naming view, sizes and numbers.
-pub fn render(
-    views: &[CalibratedView<'_>],
-    camera: &Camera,
+/// A virtual view of general cameras.
+pub struct Plane<'a> {
+    views: &'a [CalibratedView<'a>],
+    chosen: Vec<usize>,
+    footprint: Footprint,
+    shares: Shares,
     size: (usize, usize),
-    settings: &RenderSettings,
-) -> Result<Rendering, RenderError> {
-    render_watched(views, camera, size, settings, &|_| ())
+    settings: RenderSettings,
 }
 
-/// As [`render`]; `watch` is called with the share of the work that is done.
-///
-/// # Errors
-/// As [`render`].
-pub fn render_watched(
-    views: &[CalibratedView<'_>],
-    camera: &Camera,
-    size: (usize, usize),
-    settings: &RenderSettings,
-    watch: Watch<'_>,
-) -> Result<Rendering, RenderError> {
-    check(views, size, settings)?;
-    let colour = views.iter().any(|v| v.image.channels() == 3);
-    match (settings.interpolation.plane.degree, colour) {
-        (Degree::Linear, false) => render_with::<2, 1>(views, camera, size, settings, watch),
-        (Degree::Linear, true) => render_with::<2, 3>(views, camera, size, settings, watch),
-        (Degree::Cubic, false) => render_with::<4, 1>(views, camera, size, settings, watch),
-        (Degree::Cubic, true) => render_with::<4, 3>(views, camera, size, settings, watch),
+impl Geometry for Camera {
+    type Virtual<'a> = Plane<'a>;
+
+    fn check(views: &[CalibratedView<'_>]) -> Result<(), RenderError> {
+        let largest = views.iter().map(|v| v.image.width() * v.image.height()).max().unwrap_or(0);
+        check_counts(views.len(), largest)?;
+        let mut all = views.iter().enumerate();
+        all.try_for_each(|(view, v)| check_size(view, "the depth map", v.map.size(), v.image.size()))
+    }
+
+    fn virtual_view<'a>(
+        renderer: &'a Renderer<'_, Self>,
+        camera: &Self,
+        size: (usize, usize),
+    ) -> Result<Plane<'a>, RenderError> {
+        let (views, agreement, settings) = (renderer.views(), renderer.agreement(), renderer.settings());
+        check_counts(views.len(), size.0.saturating_mul(size.1))?;
+        let chosen = chosen(views, &Placed { camera: *camera, size }, settings);
+        let view_weights = ViewWeights::of(views, camera).only(&chosen).with_noise(agreement);
+        let settings = settings.suited_to(agreement, &view_weights, Measure::Depth);
+        let frame = Frame::whole(size.0, size.1, 0.5, settings.offset);
+        let footprint = Footprint::of(views, &chosen, camera, &frame);
+        let shares = Shares {
+            nearness: Nearness::new(views.iter().map(|view| view.camera), camera),
+            camera: *camera,
+            offset: settings.offset,
+            width: size.0,
+            sharing: Shares::sharing(settings.nearest),
+            view_weights: match settings.keep_exposure {
+                true => view_weights,
+                false => view_weights.with_gains(&agreement.gains),
+            },
+        };
+        Ok(Plane { views, chosen, footprint, shares, size, settings })
     }
 }
 
-fn view_weights(views: &[CalibratedView<'_>], camera: &Camera, settings: &RenderSettings) -> ViewWeights {
-    match settings.nearest {
-        Some(_) => ViewWeights::by_angle(views, camera).nearest(settings.nearest),
-        None => ViewWeights::of(views, camera),
-    }
-}
-
-fn check(
-    views: &[CalibratedView<'_>],
-    size: (usize, usize),
-    settings: &RenderSettings,
-) -> Result<(), RenderError> {
-    let largest = views.iter().map(|v| v.image.width() * v.image.height()).max().unwrap_or(0);
-    check_counts(views.len(), largest.max(size.0.saturating_mul(size.1)))?;
-    settings.check()?;
-    if settings.method == Method::Rows {
-        return Err(RenderError::RowsOfGeneralCameras);
-    }
-    let mut all = views.iter().enumerate();
-    all.try_for_each(|(view, v)| check_size(view, "the depth map", v.map.size(), v.image.size()))
+/// The views that a virtual view is made of, by number.
+fn chosen(views: &[CalibratedView<'_>], target: &Placed, settings: &RenderSettings) -> Vec<usize> {
+    let placed = |view: &CalibratedView<'_>| Placed { camera: view.camera, size: view.image.size() };
+    let depths = |share: f64| {
+        let mut depths: Vec<f64> =
+            views.iter().filter_map(|view| view.map.quantile(share)).map(f64::from).collect();
+        median(&mut depths)
+    };
+    let depths: Vec<f64> = QUARTILES.into_iter().filter_map(depths).collect();
+    choose(&views.iter().map(placed).collect::<Vec<_>>(), target, &depths, settings.nearest)
 }
 
 /// Bands of rows for views of so many pixels in all.
@@ -83,62 +89,61 @@ fn bands_of(pixels: usize, height: usize) -> usize {
     pixels.div_ceil(SAMPLES_AT_A_TIME).min(height.div_ceil(FEWEST_ROWS)).max(1)
 }
 
-fn render_with<const ORDER: usize, const C: usize>(
-    views: &[CalibratedView<'_>],
-    camera: &Camera,
-    (width, height): (usize, usize),
-    settings: &RenderSettings,
-    watch: Watch<'_>,
-) -> Result<Rendering, RenderError> {
-    let view_weights = view_weights(views, camera, settings);
-    let agreement = Agreement::of(views);
-    let view_weights = view_weights.with_noise(&agreement);
-    let settings = &settings.suited_to(&agreement, &view_weights, Measure::Depth);
-    let chosen = view_weights.views();
-    let pixels: usize = chosen.iter().map(|v| views[*v].image.width() * views[*v].image.height()).sum();
-    let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &settings.interpolation);
-    let footprint = Footprint::of(views, &chosen, camera, &Frame::whole(width, height, 0.5, settings.offset));
-    let view_weights =
-        if settings.keep_exposure { view_weights } else { view_weights.with_gains(&agreement.gains) };
-    let count = bands_of(footprint.most_samples(), height);
-    let bands: Vec<Range<usize>> =
-        (0..count).map(|band| band * height / count..(band + 1) * height / count).collect();
-    let (ready, propagated) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    problem.add_bands(&bands, |rows| {
-        let (mut samples, all) = visible_in(rows, height, &footprint, views, settings.depth_test());
-        view_weights.apply(&mut samples);
-        propagated.fetch_add(all, Ordering::Relaxed);
-        watch(GATHERING * (ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64);
-        samples
-    });
-    let propagated = propagated.into_inner();
-    let (used, dropped) = (problem.samples(), footprint.dropped(propagated));
-    drop(footprint);
-    if propagated == 0 {
-        return Err(RenderError::NoOverlap { pixels, dropped });
+impl<const C: usize> Stages<C> for Plane<'_> {
+    type Samples = Projected;
+
+    /// The band is widened by the largest radius of the depth test on both sides, so that it contains every
+    /// sample that can hide one of the band.
+    fn propagate(&self, rows: &Range<usize>) -> Projected {
+        let top = if rows.start == 0 { f64::MIN } else { rows.start as f64 };
+        let bottom = if rows.end == self.size.1 { f64::MAX } else { rows.end as f64 };
+        self.footprint.project_between(self.views, (top, bottom), self.settings.depth_test())
     }
-    let report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
-    let fit = problem.stiffened_by_area().solve(&|share| watch(GATHERING + (1.0 - GATHERING) * share));
-    Ok(Rendering::of_plane::<C>(fit, report, chosen, agreement))
+
+    fn remove_hidden(&self, _: &Range<usize>, mut projected: Projected) -> Visible<C> {
+        let propagated = projected.count();
+        projected.share(self.shares.of_points());
+        projected.remove(PlaneSearch::default().hidden(projected.points(), self.settings.depth_test()));
+        let mut samples = projected.samples(self.views);
+        self.shares.apply(&mut samples, projected.shares());
+        Visible { samples, propagated, ..Visible::default() }
+    }
+
+    fn interpolate(
+        &self,
+        visible: impl Fn(Range<usize>) -> Visible<C> + Sync,
+    ) -> Result<Rendering, RenderError> {
+        match self.settings.interpolation.plane.degree {
+            Degree::Linear => self.fit::<2, C>(visible),
+            Degree::Cubic => self.fit::<4, C>(visible),
+        }
+    }
 }
 
-/// The first two stages for some rows of the virtual image: the visible samples of these rows, and the
-/// number of all of their samples. The band is widened by the largest radius of the depth test on both
-/// sides, so that it contains every sample that can hide one of the band.
-fn visible_in<const C: usize>(
-    rows: &Range<usize>,
-    height: usize,
-    footprint: &Footprint,
-    views: &[CalibratedView<'_>],
-    test: &DepthTest,
-) -> (Vec<Sample<C>>, usize) {
-    let last = rows.end == height;
-    let top = if rows.start == 0 { f64::MIN } else { rows.start as f64 };
-    let bottom = if last { f64::MAX } else { rows.end as f64 };
-    let mut projected = footprint.project_between(views, (top, bottom), test);
-    let all = projected.count();
-    projected.remove(PlaneSearch::default().hidden(projected.points(), test));
-    (projected.samples(views), all)
+impl Plane<'_> {
+    fn fit<const ORDER: usize, const C: usize>(
+        &self,
+        visible: impl Fn(Range<usize>) -> Visible<C> + Sync,
+    ) -> Result<Rendering, RenderError> {
+        let (height, count) = (self.size.1, bands_of(self.footprint.most_samples(), self.size.1));
+        let bands: Vec<Range<usize>> =
+            (0..count).map(|band| band * height / count..(band + 1) * height / count).collect();
+        let mut problem = PlaneProblem::<ORDER, C>::new(self.size, &self.settings.interpolation);
+        let propagated = AtomicUsize::new(0);
+        problem.add_bands(&bands, |rows| {
+            let found = visible(rows.clone());
+            propagated.fetch_add(found.propagated, Ordering::Relaxed);
+            found.samples
+        });
+        let (propagated, used) = (propagated.into_inner(), problem.samples());
+        let dropped = self.footprint.dropped(propagated);
+        if propagated == 0 {
+            return Err(RenderError::NoOverlap { pixels: self.footprint.pixels(), dropped });
+        }
+        let report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
+        let fit = problem.stiffened_by_area().solve();
+        Ok(Rendering::of_plane::<C>(fit, report, self.chosen.clone(), Agreement::default()))
+    }
 }
 
 #[cfg(test)]
@@ -149,6 +154,15 @@ mod tests {
     use crate::occlusion;
     use crate::propagate;
     use nalgebra::Matrix3x4;
+
+    fn render(
+        views: &[CalibratedView<'_>],
+        camera: &Camera,
+        size: (usize, usize),
+        settings: &RenderSettings,
+    ) -> Result<Rendering, RenderError> {
+        Renderer::new(views, settings)?.render(camera, size)
+    }
 
     fn camera(x: f64, turn: f64) -> Camera {
         let r = nalgebra::Rotation3::from_euler_angles(0.0, turn, 0.02);
@@ -178,24 +192,58 @@ mod tests {
         assert_eq!((got.report.propagated, got.report.dropped), (samples.len(), dropped));
         assert_eq!(got.report.occluded, occlusion::remove(&mut samples, settings.depth_test()));
         assert!(got.report.occluded > 0);
-        ViewWeights::of(&views, &target).apply(&mut samples);
+        let renderer = Renderer::new(&views, &settings).unwrap();
+        let plane = Camera::virtual_view(&renderer, &target, (40, 30)).unwrap();
+        let mut of_point = plane.shares.of_points();
+        let all = samples.iter().map(|s| of_point(s.view, [s.x, s.y], s.depth)).collect();
+        plane.shares.apply(&mut samples, all);
         let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation);
         problem.add(&samples);
-        let fit = problem.stiffened_by_area().solve(&|_| ());
+        let fit = problem.stiffened_by_area().solve();
         assert_eq!((got.image.data(), &got.mask), (&fit.values[..], &fit.mask));
         // In bands only the order of summation differs.
-        let footprint = Footprint::of(&views, &(0..views.len()).collect::<Vec<_>>(), &target, &frame);
         let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation);
         for rows in [0..7, 7..8, 8..30] {
-            let (mut band, _) = visible_in(&rows, 30, &footprint, &views, settings.depth_test());
-            ViewWeights::of(&views, &target).apply(&mut band);
-            problem.add(&band);
+            let projected = Stages::<1>::propagate(&plane, &rows);
+            problem.add(&Stages::<1>::remove_hidden(&plane, &rows, projected).samples);
         }
         assert_eq!(problem.samples(), samples.len());
-        let banded = problem.stiffened_by_area().solve(&|_| ());
+        let banded = problem.stiffened_by_area().solve();
         assert_eq!(banded.mask, fit.mask);
         let worst = banded.values.iter().zip(&fit.values).fold(0.0, |w: f32, (a, b)| w.max((a - b).abs()));
         assert!(worst < 1e-2, "{worst}");
+    }
+
+    /// A frame of a film has the bits of a picture, whatever was rendered before.
+    #[test]
+    fn renderings_are_repeatable() {
+        let (image, depth) = scene();
+        let view = |c| CalibratedView { image: &image, map: &depth, camera: c };
+        let views = [view(camera(-0.3, 0.03)), view(camera(0.4, -0.04))];
+        let film = Renderer::new(&views, &RenderSettings::default()).unwrap();
+        let frames = [0.05, 0.2, 0.05].map(|x| film.render(&camera(x, 0.0), (40, 30)).unwrap());
+        assert!(frames[0] == frames[2] && frames[0] != frames[1]);
+        let alone = render(&views, &camera(0.2, 0.0), (40, 30), &RenderSettings::default()).unwrap();
+        assert!(alone == frames[1]);
+    }
+
+    /// Where all depths are guesses the texture keeps most of the contrast that it has where they are known.
+    #[test]
+    fn texture_on_guessed_depth_keeps_its_contrast() {
+        let texture = |i: usize| 120.0 + 60.0 * ((i % 40) as f32 * 1.3).sin() * ((i / 40) as f32 * 1.1).cos();
+        let image = Image::new(40, 30, 1, (0..1200).map(texture).collect()).unwrap();
+        let is_hole = |p: usize| (10..30).contains(&(p % 40)) && (8..24).contains(&(p / 40));
+        let known = DepthMap::new((40, 30), vec![5.0; 1200], 1.0, Measure::Depth).unwrap();
+        let holes = (0..1200).map(|p| if is_hole(p) { f32::NAN } else { 5.0 }).collect();
+        let mut guessed = DepthMap::new((40, 30), holes, 1.0, Measure::Depth).unwrap();
+        crate::depth::fill_unknown(&mut guessed);
+        let contrast = |map: &DepthMap| {
+            let views = [CalibratedView { image: &image, map, camera: camera(0.0, 0.0) }];
+            let got = render(&views, &camera(0.04, 0.0), (40, 30), &RenderSettings::default()).unwrap().image;
+            let inner = (0..1200).filter(|p| (13..27).contains(&(p % 40)) && (11..21).contains(&(p / 40)));
+            inner.map(|p| f64::from(got.data()[p] - 120.0).powi(2)).sum::<f64>().sqrt()
+        };
+        assert!(contrast(&guessed) > 0.75 * contrast(&known), "{} {}", contrast(&guessed), contrast(&known));
     }
 
     #[test]

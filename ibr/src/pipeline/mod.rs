@@ -1,10 +1,13 @@
-//! Complete renderings: the three stages for each kind of input.
+//! Complete renderings: the three stages, one after the other, for each kind of input.
 
 mod agreement;
 pub mod calibrated;
 pub(crate) mod depth_errors;
 mod exposure;
+pub(crate) mod nearness;
 pub mod rectified;
+mod rendering;
+mod shares;
 mod smoothing;
 pub mod uncalibrated;
 mod view_weights;
@@ -14,223 +17,136 @@ pub(crate) use agreement::{GREY_LEVELS, same_depth};
 pub(crate) use depth_errors::{DEVIATION_PER_MEDIAN, median};
 pub use exposure::Exposure;
 pub(crate) use exposure::without_drift;
+pub use rendering::{RenderError, RenderSettings, Rendering, Report};
+use rendering::{check_counts, check_size};
 pub use view_weights::ViewWeights;
 
-use crate::depth::DepthMap;
-use crate::image::Image;
-pub use crate::interpolate::Watch;
-use crate::interpolate::plane::{Convergence, PlaneFit};
-use crate::interpolate::{Cover, HoleCount, Settings};
-use crate::occlusion::DepthTest;
-use crate::sample::Dropped;
-use crate::setting::{FINITE, POSITIVE, SettingError};
+use crate::propagate::{View, Viewpoint};
+use crate::sample::{Dropped, Sample};
+use std::ops::Range;
 
-/// The method of the third stage.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
-#[non_exhaustive]
-pub enum Method {
-    /// rows for rectified rigs, plane for other scenes.
-    #[default]
-    Auto,
-    /// One spline per row (rectified rigs only).
-    Rows,
-    /// One spline for the whole image.
-    Plane,
+/// Renders virtual views of some photographs with maps. What the virtual camera does not change is found
+/// once: how the views agree, their noise, exposures and errors of depth.
+///
+/// ```
+/// use hybank_ibr::depth::{DepthMap, Measure};
+/// use hybank_ibr::image::Image;
+/// use hybank_ibr::pipeline::{RenderSettings, Renderer};
+/// use hybank_ibr::propagate::RectifiedView;
+/// let image = Image::filled(32, 8, 1, 100.0);
+/// let map = DepthMap::new((32, 8), vec![4.0; 256], 1.0, Measure::Disparity)?;
+/// let views = [0.0, 1.0].map(|camera| RectifiedView { image: &image, map: &map, camera });
+/// let renderer = Renderer::new(&views, &RenderSettings::default())?;
+/// let film = [0.25, 0.5, 0.75].map(|position| renderer.render(&position, image.size()));
+/// assert_eq!(film[1].as_ref().map(|view| view.coverage()), Ok(1.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Renderer<'a, P> {
+    views: Vec<View<'a, P>>,
+    settings: RenderSettings,
+    agreement: Agreement,
 }
 
-/// Settings of a rendering. The defaults are the same for every scene.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct RenderSettings {
-    /// The third stage used.
-    pub method: Method,
-    /// Fit, holes, and the depth test of the second stage.
-    pub interpolation: Settings,
-    /// Added to every column, in pixels: registration of the virtual image.
-    pub offset: f64,
-    /// Use the colours of every view as they are. Otherwise views get the exposure and the white balance of
-    /// the first one, except for drift, which follows the place of the virtual camera.
-    pub keep_exposure: bool,
-    /// Use lambda and stiffness as they are. Otherwise they follow from the noise and the slopes of the
-    /// photographs, where cameras are known.
-    pub keep_smoothing: bool,
-    /// Use only so many views, those that [`ViewWeights`] finds nearest to the virtual camera; all without
-    /// it.
-    pub nearest: Option<usize>,
+/// Samples of some rows of the virtual image.
+#[derive(Debug, Clone, Default)]
+pub struct Visible<const C: usize> {
+    /// Those that nothing hides, with the weights and the exposures of their views.
+    pub samples: Vec<Sample<C>>,
+    /// Samples before hidden ones were removed.
+    pub propagated: usize,
+    /// Pixels that did not become samples, where rows know them.
+    pub dropped: Dropped,
 }
 
-impl RenderSettings {
-    /// The depth test.
-    pub fn depth_test(&self) -> &DepthTest {
-        &self.interpolation.depth_test
-    }
+/// The stages for one virtual view in C channels.
+pub trait Stages<const C: usize>: Sync {
+    /// Samples as the first stage makes them.
+    type Samples;
 
-    /// Refuses settings outside their range.
+    /// Stage one: pixels of the views become samples of these rows of the virtual image.
+    fn propagate(&self, rows: &Range<usize>) -> Self::Samples;
+
+    /// Stage two: samples that lie behind others go, and views get their shares.
+    fn remove_hidden(&self, rows: &Range<usize>, samples: Self::Samples) -> Visible<C>;
+
+    /// Stage three: the image is fitted to the visible samples; `visible` gives those of some rows.
     ///
     /// # Errors
-    /// [`SettingError`].
-    pub fn check(&self) -> Result<(), SettingError> {
-        self.interpolation.check()?;
-        POSITIVE.check("number of nearest views", self.nearest.unwrap_or(1) as f64)?;
-        FINITE.check("offset", self.offset)
-    }
+    /// [`RenderError::NoOverlap`] and [`RenderError::Fit`].
+    fn interpolate(
+        &self,
+        visible: impl Fn(Range<usize>) -> Visible<C> + Sync,
+    ) -> Result<Rendering, RenderError>;
 }
 
-/// Errors of a rendering.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum RenderError {
-    /// No view was given.
-    #[error("there is no view to render from: give at least one")]
-    NoViews,
-    /// More views or pixels than the indices of samples can hold.
-    #[error("{views} views of up to {pixels} pixels: at most 65535 views of 2^32 - 1 pixels can be used")]
-    TooLarge {
-        /// Views given.
-        views: usize,
-        /// Pixels of the largest.
-        pixels: usize,
-    },
-    /// Views of different sizes in a rectified rig, or a map of another size than its image.
-    #[error("view {view}: {what} has {} x {} pixels instead of {} x {}", size.0, size.1, expected.0, expected.1)]
-    Size {
-        /// Index of the view.
-        view: usize,
-        /// The image or the map.
-        what: &'static str,
-        /// Its width and height.
+/// A kind of cameras with its stages: rigs work in rows, and general cameras on the plane.
+pub trait Geometry: Viewpoint {
+    /// A virtual view.
+    type Virtual<'a>: Stages<1> + Stages<3>
+    where
+        Self: 'a;
+
+    /// Refuses views that do not fit each other.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    fn check(views: &[View<'_, Self>]) -> Result<(), RenderError>;
+
+    /// The virtual view of a camera: which views it is made of, and with which weights.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    fn virtual_view<'a>(
+        renderer: &'a Renderer<'_, Self>,
+        camera: &Self,
         size: (usize, usize),
-        /// Width and height expected.
-        expected: (usize, usize),
-    },
-    /// The row fit was asked for where samples lie between rows.
-    #[error(
-        "the row method needs a rectified rig: the samples of general cameras lie between rows; use the plane method"
-    )]
-    RowsOfGeneralCameras,
-    /// A setting or a position outside its range.
-    #[error(transparent)]
-    Setting(#[from] SettingError),
-    /// Images and columns of tracks do not fit.
-    #[error(
-        "{images} images have {columns} columns of tracks; at least two views are needed, each with a column"
-    )]
-    Tracks {
-        /// Images given.
-        images: usize,
-        /// Columns of tracks given.
-        columns: usize,
-    },
-    /// The geometry of views without cameras could not be estimated.
-    #[error(transparent)]
-    Geometry(#[from] crate::uncalibrated::GeometryError),
-    /// The equations of a row could not be solved.
-    #[error("row {row}: {source}")]
-    Fit {
-        /// The row.
-        row: usize,
-        /// The solver's error.
-        source: hybank_sampling::SamplingError,
-    },
-    /// No sample lies in the virtual image.
-    #[error(
-        "no sample lies in the virtual image: of {pixels} pixels {} have no depth, {} lie behind the virtual camera and {} fall outside its image; check positions, cameras and the depth scale",
-        dropped.unknown, dropped.behind, dropped.outside
-    )]
-    NoOverlap {
-        /// Pixels of all views.
-        pixels: usize,
-        /// Pixels dropped, by reason.
-        dropped: Dropped,
-    },
+    ) -> Result<Self::Virtual<'a>, RenderError>;
 }
 
-/// Counts of samples and holes of a rendering.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
-pub struct Report {
-    /// Samples in the virtual image.
-    pub propagated: usize,
-    /// Of these, removed as hidden.
-    pub occluded: usize,
-    /// Of these, used by the interpolation.
-    pub used: usize,
-    /// Pixels that did not become samples.
-    pub dropped: Dropped,
-    /// Pixels of the virtual image without a sample.
-    #[serde(skip)]
-    pub holes: HoleCount,
-    /// How the plane fit ended; `None` for the row fit.
-    #[serde(skip)]
-    pub convergence: Option<Convergence>,
-}
-
-/// A rendered view.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Rendering {
-    /// The image.
-    pub image: Image,
-    /// Origin of each pixel's value.
-    pub mask: Vec<Cover>,
-    /// Depth of each pixel at the virtual camera, NaN in holes: the disparity for a baseline of one of a
-    /// rectified rig, the depth of calibrated cameras, and the signed order of depth without cameras.
-    pub depth: DepthMap,
-    /// Visible samples that are nearest to each pixel.
-    pub counts: Vec<u16>,
-    /// The views that were used, by number from 0.
-    pub views: Vec<usize>,
-    /// Counts.
-    pub report: Report,
-    /// How well the views agree with each other; empty without depth maps.
-    pub agreement: Agreement,
-}
-
-impl Rendering {
-    /// Of a plane fit of C channels; the report is that of the stages before it.
-    fn of_plane<const C: usize>(
-        fit: PlaneFit,
-        mut report: Report,
-        views: Vec<usize>,
-        agreement: Agreement,
-    ) -> Self {
-        let PlaneFit { values, mask, depth, counts, convergence } = fit;
-        (report.holes, report.convergence) = (HoleCount::of(&mask), Some(convergence));
-        Self {
-            image: Image::from_values(depth.size(), C, values),
-            mask,
-            depth,
-            counts,
-            views,
-            report,
-            agreement,
-        }
+impl<'a, P: Geometry> Renderer<'a, P> {
+    /// Of views with dense maps, as [`prepare`](crate::scene::prepare) makes them.
+    ///
+    /// # Errors
+    /// [`RenderError`], naming view, sizes and numbers.
+    pub fn new(views: &[View<'a, P>], settings: &RenderSettings) -> Result<Self, RenderError> {
+        P::check(views)?;
+        settings.check()?;
+        Ok(Self { views: views.to_vec(), settings: *settings, agreement: Agreement::of(views) })
     }
 
-    /// Share of the pixels that samples cover.
-    pub fn coverage(&self) -> f64 {
-        1.0 - HoleCount::of(&self.mask).total() as f64 / self.mask.len() as f64
+    /// The views.
+    pub fn views(&self) -> &[View<'a, P>] {
+        &self.views
     }
 
-    /// Opacity of each pixel: 1 where a surface was seen or bridged, 0 where the value was made up because
-    /// no view shows what is there.
-    pub fn alpha(&self) -> Vec<f32> {
-        self.mask.iter().map(|c| if *c == Cover::Disocclusion { 0.0 } else { 1.0 }).collect()
+    /// How well the views agree.
+    pub fn agreement(&self) -> &Agreement {
+        &self.agreement
+    }
+
+    fn settings(&self) -> &RenderSettings {
+        &self.settings
+    }
+
+    /// The view of `camera` with `size` pixels, RGB if any view is; that of a rectified rig has the size of
+    /// the views.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn render(&self, camera: &P, size: (usize, usize)) -> Result<Rendering, RenderError> {
+        let view = P::virtual_view(self, camera, size)?;
+        let rendering = match self.views.iter().any(|view| view.image.channels() == 3) {
+            true => stages::<3, _>(&view)?,
+            false => stages::<1, _>(&view)?,
+        };
+        Ok(Rendering { agreement: self.agreement.clone(), ..rendering })
     }
 }
 
-fn check_size(
-    view: usize,
-    what: &'static str,
-    size: (usize, usize),
-    expected: (usize, usize),
-) -> Result<(), RenderError> {
-    if size == expected { Ok(()) } else { Err(RenderError::Size { view, what, size, expected }) }
-}
-
-fn check_counts(views: usize, pixels: usize) -> Result<(), RenderError> {
-    if views == 0 {
-        return Err(RenderError::NoViews);
-    }
-    if views > usize::from(u16::MAX) || pixels > u32::MAX as usize {
-        return Err(RenderError::TooLarge { views, pixels });
-    }
-    Ok(())
+/// The Propagation Algorithm.
+fn stages<const C: usize, V: Stages<C>>(view: &V) -> Result<Rendering, RenderError> {
+    view.interpolate(|rows| {
+        let samples = view.propagate(&rows);
+        view.remove_hidden(&rows, samples)
+    })
 }

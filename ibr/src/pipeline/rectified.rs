@@ -1,225 +1,170 @@
-//! A view from a rectified rig: the three stages run row by row, rows in parallel.
+//! Virtual views of rectified rigs: the three stages run row by row, rows in parallel.
 
+use super::nearness::SHARING;
 use super::{
-    Agreement, Method, RenderError, RenderSettings, Rendering, Report, ViewWeights, Watch, check_counts,
-    check_size,
+    Agreement, Geometry, RenderError, RenderSettings, Renderer, Rendering, Report, Stages, ViewWeights,
+    Visible, check_counts, check_size,
 };
 use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
-use crate::interpolate::plane::PlaneProblem;
 use crate::interpolate::rows::{self, RowWork, nearest_depths};
-use crate::interpolate::{Cover, Degree, HoleCount};
+use crate::interpolate::{Cover, HoleCount};
 use crate::occlusion::{self, RowScratch};
 use crate::propagate::{self, Frame, RectifiedView, RigCamera};
-use crate::sample::{Dropped, Sample};
+use crate::sample::Dropped;
 use crate::setting::FINITE;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::ops::Range;
 
-/// Renders the view from `position` on the line of the cameras.
-///
-/// All views must have the size of the first, which is also that of the result; the result is RGB if
-/// any view is.
-///
-/// # Errors
-/// [`RenderError`], naming view, sizes and numbers.
-pub fn render(
-    views: &[RectifiedView<'_>],
-    position: f64,
-    settings: &RenderSettings,
-) -> Result<Rendering, RenderError> {
-    render_watched(views, position, settings, &|_| ())
+/// A virtual view of a rectified rig.
+pub struct Rows<'a> {
+    views: &'a [RectifiedView<'a>],
+    camera: RigCamera,
+    view_weights: ViewWeights,
+    frame: Frame,
+    settings: RenderSettings,
 }
 
-/// As [`render`]; `watch` is called with the share of the work that is done.
-///
-/// # Errors
-/// As [`render`].
-pub fn render_watched(
-    views: &[RectifiedView<'_>],
-    position: f64,
-    settings: &RenderSettings,
-    watch: Watch<'_>,
-) -> Result<Rendering, RenderError> {
-    check(views, position)?;
-    settings.check()?;
-    let colour = views.iter().any(|v| v.image.channels() == 3);
-    match colour {
-        false => render_with::<1>(views, position, settings, watch),
-        true => render_with::<3>(views, position, settings, watch),
+impl Geometry for f64 {
+    type Virtual<'a> = Rows<'a>;
+
+    /// All views have the size of the first, which is also that of the virtual one.
+    fn check(views: &[RectifiedView<'_>]) -> Result<(), RenderError> {
+        let first = views.first().ok_or(RenderError::NoViews)?;
+        let (width, height) = first.image.size();
+        check_counts(views.len(), width * height)?;
+        for (view, v) in views.iter().enumerate() {
+            check_size(view, "the image", v.image.size(), first.image.size())?;
+            check_size(view, "the disparity map", v.map.size(), first.image.size())?;
+        }
+        views.iter().try_for_each(|view| Ok(FINITE.check("position", view.camera)?))
+    }
+
+    fn virtual_view<'a>(
+        renderer: &'a Renderer<'_, Self>,
+        position: &Self,
+        _: (usize, usize),
+    ) -> Result<Rows<'a>, RenderError> {
+        FINITE.check("position", *position)?;
+        let (views, agreement, settings) = (renderer.views(), renderer.agreement(), renderer.settings());
+        let mut view_weights = ViewWeights::of(views, position)
+            .nearest(settings.nearest.unwrap_or(SHARING))
+            .with_noise(agreement);
+        let settings = settings.suited_to(agreement, &view_weights, Measure::Disparity);
+        if !settings.keep_exposure {
+            view_weights = view_weights.with_gains(&agreement.gains);
+        }
+        let (width, height) = views[0].image.size();
+        let frame = Frame::whole(width, height, rows::MARGIN, settings.offset);
+        let camera = RigCamera { test: *settings.depth_test(), ..RigCamera::new(views, *position) };
+        Ok(Rows { views, camera, view_weights, frame, settings })
     }
 }
 
-fn check(views: &[RectifiedView<'_>], position: f64) -> Result<(), RenderError> {
-    let first = views.first().ok_or(RenderError::NoViews)?;
-    let (width, height) = first.image.size();
-    check_counts(views.len(), width * height)?;
-    for (view, v) in views.iter().enumerate() {
-        check_size(view, "the image", v.image.size(), first.image.size())?;
-        check_size(view, "the disparity map", v.map.size(), first.image.size())?;
+impl<const C: usize> Stages<C> for Rows<'_> {
+    type Samples = Visible<C>;
+
+    fn propagate(&self, rows: &Range<usize>) -> Visible<C> {
+        let used = self.views.iter().enumerate().filter(|(index, _)| self.view_weights.uses(*index));
+        let mut all = Visible::default();
+        for (row, (index, view)) in rows.clone().flat_map(|row| used.clone().map(move |view| (row, view))) {
+            let samples = &mut all.samples;
+            all.dropped +=
+                propagate::rectified_row(view, index as u16, row, &self.camera, &self.frame, samples);
+        }
+        Visible { propagated: all.samples.len(), ..all }
     }
-    let positions = views.iter().map(|v| v.camera).chain([position]);
-    positions.into_iter().try_for_each(|position| Ok(FINITE.check("position", position)?))
-}
 
-pub(crate) struct Job<'a> {
-    pub(crate) views: &'a [RectifiedView<'a>],
-    pub(crate) camera: RigCamera,
-    pub(crate) view_weights: ViewWeights,
-    pub(crate) frame: Frame,
-    pub(crate) settings: &'a RenderSettings,
-    pub(crate) watch: Watch<'a>,
-}
-
-fn render_with<const C: usize>(
-    views: &[RectifiedView<'_>],
-    position: f64,
-    settings: &RenderSettings,
-    watch: Watch<'_>,
-) -> Result<Rendering, RenderError> {
-    let (width, height) = views[0].image.size();
-    let agreement = Agreement::of(views);
-    let mut view_weights = ViewWeights::of(views, &position).nearest(settings.nearest).with_noise(&agreement);
-    let chosen = view_weights.views();
-    let settings = &settings.suited_to(&agreement, &view_weights, Measure::Disparity);
-    if !settings.keep_exposure {
-        view_weights = view_weights.with_gains(&agreement.gains);
+    fn remove_hidden(&self, _: &Range<usize>, mut all: Visible<C>) -> Visible<C> {
+        occlusion::remove_in_row(&mut all.samples, self.settings.depth_test(), &mut RowScratch::default());
+        self.view_weights.apply(&mut all.samples);
+        all
     }
-    let whole = |margin| {
-        let frame = Frame::whole(width, height, margin, settings.offset);
-        let camera = RigCamera::new(views, position);
-        Job { views, camera, view_weights, frame, settings, watch }
-    };
-    let rendering = match settings.method {
-        Method::Plane => match settings.interpolation.plane.degree {
-            Degree::Linear => render_plane::<2, C>(&whole(0.5)),
-            Degree::Cubic => render_plane::<4, C>(&whole(0.5)),
-        },
-        Method::Auto | Method::Rows => render_rows::<C>(&whole(rows::MARGIN)),
-    }?;
-    Ok(Rendering { agreement, views: chosen, ..rendering })
-}
 
-fn render_rows<const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> {
-    let Frame { width, height, .. } = job.frame;
-    let mut values = vec![0.0; width * height * C];
-    let mut mask = vec![Cover::Disocclusion; width * height];
-    let mut keys = vec![f32::NAN; width * height];
-    let mut samples = vec![0_u16; width * height];
-    let mut counts = vec![RowCount::default(); height];
-    let ready = AtomicUsize::new(0);
-    // Blocks of rows share work memory; their borders do not affect the result.
-    let block = height.div_ceil(4 * rayon::current_num_threads()).max(1);
-    let outputs = values
-        .par_chunks_mut(block * width * C)
-        .zip(mask.par_chunks_mut(block * width).zip(keys.par_chunks_mut(block * width)))
-        .zip(samples.par_chunks_mut(block * width).zip(counts.par_chunks_mut(block)));
-    outputs.enumerate().try_for_each(|(b, ((values, (mask, keys)), (samples, counts)))| {
-        let (mut strip, mut fit) = (Strip::<C>::new(job), RowWork::<C>::new(width));
-        let masks = mask.chunks_exact_mut(width).zip(keys.chunks_exact_mut(width));
-        let tallies = samples.chunks_exact_mut(width).zip(counts);
-        let rows = values.chunks_exact_mut(width * C).zip(masks).zip(tallies);
-        rows.enumerate().try_for_each(|(k, ((values, (mask, keys)), (samples, count)))| {
-            let row = b * block + k;
-            *count = strip.survivors_of_row(job, row);
-            rows::count(&strip.samples, samples);
-            nearest_depths(&strip.samples, keys);
-            (job.watch)((ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / height as f64);
-            fit.interpolate(&strip.samples, &job.settings.interpolation, values, mask)
-                .map(|_| ())
-                .map_err(|source| RenderError::Fit { row, source })
-        })
-    })?;
-    let report = report(job, &counts, &mask)?;
-    let filled: Vec<bool> = counts.iter().map(|c| c.used > 0).collect();
-    rows::finish::<C>(&filled, &mask, &keys, &job.settings.interpolation, &mut values);
-    job.disparities(&mut keys);
-    let image = Image::from_values((width, height), C, values);
-    let depth = DepthMap::from_known((width, height), keys, Measure::Disparity);
-    let (views, agreement) = (Vec::new(), Agreement::default());
-    Ok(Rendering { image, mask, depth, counts: samples, views, report, agreement })
-}
-
-/// The same with the plane fit as third stage; the second stage still runs row by row.
-fn render_plane<const ORDER: usize, const C: usize>(job: &Job<'_>) -> Result<Rendering, RenderError> {
-    let Frame { width, height, .. } = job.frame;
-    let mut problem = PlaneProblem::<ORDER, C>::new((width, height), &job.settings.interpolation);
-    let mut strip = Strip::<C>::new(job);
-    let mut counts = Vec::with_capacity(height);
-    for row in 0..height {
-        counts.push(strip.survivors_of_row(job, row));
-        problem.add(&strip.samples);
-    }
-    let report = report(job, &counts, &[])?;
-    let fit = problem.solve(job.watch);
-    let mut keys = fit.depth.data().to_vec();
-    job.disparities(&mut keys);
-    let depth = DepthMap::from_known((width, height), keys, Measure::Disparity);
-    Ok(Rendering { depth, ..Rendering::of_plane::<C>(fit, report, Vec::new(), Agreement::default()) })
-}
-
-impl Job<'_> {
-    fn disparities(&self, keys: &mut [f32]) {
-        let offset = self.camera.disparity_offset;
-        keys.iter_mut().for_each(|k| *k = (1.0 / f64::from(*k) - offset) as f32);
+    fn interpolate(
+        &self,
+        visible: impl Fn(Range<usize>) -> Visible<C> + Sync,
+    ) -> Result<Rendering, RenderError> {
+        let Frame { width, height, .. } = self.frame;
+        let settings = &self.settings.interpolation;
+        let (mut values, mut mask) =
+            (vec![0.0; width * height * C], vec![Cover::Disocclusion; width * height]);
+        let (mut keys, mut samples) = (vec![f32::NAN; width * height], vec![0_u16; width * height]);
+        let mut counts = vec![RowCount::default(); height];
+        let outputs = values
+            .par_chunks_exact_mut(width * C)
+            .zip(mask.par_chunks_exact_mut(width).zip(keys.par_chunks_exact_mut(width)))
+            .zip(samples.par_chunks_exact_mut(width).zip(counts.par_iter_mut()));
+        outputs.enumerate().try_for_each_init(
+            || RowWork::<C>::new(width),
+            |fit, (row, ((values, (mask, keys)), (samples, count)))| {
+                let found = visible(row..row + 1);
+                *count = RowCount::of(&found);
+                rows::count(&found.samples, samples);
+                nearest_depths(&found.samples, keys);
+                let done = fit.interpolate(&found.samples, settings, values, mask);
+                done.map(|_| ()).map_err(|source| RenderError::Fit { row, source })
+            },
+        )?;
+        let report = self.report(&counts, &mask)?;
+        let filled: Vec<bool> = counts.iter().map(|c| c.used > 0).collect();
+        rows::finish::<C>(&filled, &mask, &keys, settings, &mut values);
+        self.disparities(&mut keys);
+        let image = Image::from_values((width, height), C, values);
+        let depth = DepthMap::from_known((width, height), keys, Measure::Disparity);
+        let (views, agreement) = (self.view_weights.views(), Agreement::default());
+        Ok(Rendering { image, mask, depth, counts: samples, views, report, agreement })
     }
 }
 
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct RowCount {
+struct RowCount {
     propagated: usize,
     used: usize,
     dropped: Dropped,
 }
 
-/// The report on all rows.
-///
-/// # Errors
-/// [`RenderError::NoOverlap`].
-fn report(job: &Job<'_>, counts: &[RowCount], mask: &[Cover]) -> Result<Report, RenderError> {
-    let mut report = Report { holes: HoleCount::of(mask), ..Report::default() };
-    for c in counts {
-        report.propagated += c.propagated;
-        report.used += c.used;
-        report.dropped += c.dropped;
+impl RowCount {
+    fn of<const C: usize>(visible: &Visible<C>) -> Self {
+        let Visible { samples, propagated, dropped } = visible;
+        Self { propagated: *propagated, used: samples.len(), dropped: *dropped }
     }
-    report.occluded = report.propagated - report.used;
-    let (pixels, dropped) = (job.views.len() * job.frame.width * job.frame.height, report.dropped);
-    if report.used > 0 { Ok(report) } else { Err(RenderError::NoOverlap { pixels, dropped }) }
 }
 
-pub(crate) struct Strip<const C: usize> {
-    pub(crate) samples: Vec<Sample<C>>,
-    scratch: RowScratch<C>,
-}
-
-impl<const C: usize> Strip<C> {
-    pub(crate) fn new(job: &Job<'_>) -> Self {
-        let used = (0..job.views.len()).filter(|view| job.view_weights.uses(*view)).count();
-        let samples = Vec::with_capacity(job.frame.width * used);
-        Self { samples, scratch: RowScratch::default() }
+impl Rows<'_> {
+    fn disparities(&self, keys: &mut [f32]) {
+        let offset = self.camera.disparity_offset;
+        keys.iter_mut().for_each(|k| *k = (1.0 / f64::from(*k) - offset) as f32);
     }
 
-    /// The first two stages for one row: propagates samples and removes hidden ones.
-    pub(crate) fn survivors_of_row(&mut self, job: &Job<'_>, y: usize) -> RowCount {
-        let mut count = RowCount::default();
-        self.samples.clear();
-        for (index, view) in job.views.iter().enumerate().filter(|(i, _)| job.view_weights.uses(*i)) {
-            let index = index as u16;
-            count.dropped +=
-                propagate::rectified_row(view, index, y, &job.camera, &job.frame, &mut self.samples);
+    /// The report on all rows.
+    ///
+    /// # Errors
+    /// [`RenderError::NoOverlap`].
+    fn report(&self, counts: &[RowCount], mask: &[Cover]) -> Result<Report, RenderError> {
+        let mut report = Report { holes: HoleCount::of(mask), ..Report::default() };
+        for c in counts {
+            report.propagated += c.propagated;
+            report.used += c.used;
+            report.dropped += c.dropped;
         }
-        count.propagated = self.samples.len();
-        occlusion::remove_in_row(&mut self.samples, job.settings.depth_test(), &mut self.scratch);
-        count.used = self.samples.len();
-        job.view_weights.apply(&mut self.samples);
-        count
+        report.occluded = report.propagated - report.used;
+        let (pixels, dropped) = (self.views.len() * self.frame.width * self.frame.height, report.dropped);
+        if report.used > 0 { Ok(report) } else { Err(RenderError::NoOverlap { pixels, dropped }) }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn render(
+        views: &[RectifiedView<'_>],
+        position: f64,
+        settings: &RenderSettings,
+    ) -> Result<Rendering, RenderError> {
+        Renderer::new(views, settings)?.render(&position, (0, 0))
+    }
 
     fn scene(width: usize, height: usize, channels: usize) -> (Image, DepthMap) {
         let value = |i: usize| 120.0 + 80.0 * ((i / channels % width) as f32 * 0.4).sin() + (i % 7) as f32;
@@ -255,16 +200,13 @@ mod tests {
     #[test]
     fn the_number_of_threads_changes_no_bit() {
         let parts = [scene(64, 33, 3), scene(64, 33, 3)];
-        for method in [Method::Rows, Method::Plane] {
-            let settings = RenderSettings { method, ..RenderSettings::default() };
-            let run = |threads| {
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                pool.install(|| render(&views(&parts), 0.3, &settings).unwrap())
-            };
-            let one = run(1);
-            assert_eq!(one, run(2));
-            assert_eq!(one, run(5));
-        }
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| render(&views(&parts), 0.3, &RenderSettings::default()).unwrap())
+        };
+        let one = run(1);
+        assert_eq!(one, run(2));
+        assert_eq!(one, run(5));
     }
 
     #[test]
@@ -282,18 +224,15 @@ mod tests {
         assert!(got.depth.data().iter().all(|d| (d - 4.0).abs() < 1e-5));
     }
 
-    /// Both methods give the disparity of the nearest visible sample, and none in holes.
+    /// Pixels have the disparity of the nearest visible sample, and none in holes.
     #[test]
     fn the_virtual_view_has_disparities() {
         let parts = [scene(48, 9, 1)];
-        for method in [Method::Rows, Method::Plane] {
-            let got =
-                render(&views(&parts), 0.0, &RenderSettings { method, ..RenderSettings::default() }).unwrap();
-            for (p, d) in got.depth.data().iter().enumerate() {
-                assert_eq!(d.is_nan(), got.mask[p] != Cover::Seen, "{method:?} {p}");
-                let own = parts[0].1.data()[p];
-                assert!(d.is_nan() || own.is_nan() || (d - own).abs() < 1.0, "{method:?} {p}: {d} {own}");
-            }
+        let got = render(&views(&parts), 0.0, &RenderSettings::default()).unwrap();
+        for (p, d) in got.depth.data().iter().enumerate() {
+            assert_eq!(d.is_nan(), got.mask[p] != Cover::Seen, "{p}");
+            let own = parts[0].1.data()[p];
+            assert!(d.is_nan() || own.is_nan() || (d - own).abs() < 1.0, "{p}: {d} {own}");
         }
     }
 

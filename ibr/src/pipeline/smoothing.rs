@@ -93,7 +93,7 @@ mod tests {
     #[test]
     fn the_depth_test_allows_for_errors_of_the_views_that_count() {
         let agreement = Agreement { depth_errors: vec![0.1, 0.3, 9.0], ..Agreement::default() };
-        let weights = ViewWeights::by_distance(&[1.0, 1.0, 5.0]).nearest(Some(2));
+        let weights = ViewWeights::by_distance(&[1.0, 1.0, 5.0]).nearest(2);
         let suited = RenderSettings::default().suited_to(&agreement, &weights, Measure::Disparity);
         let found = suited.interpolation.depth_test.parallax;
         assert!((found - 3.0 * 0.1_f64.sqrt()).abs() < 1e-6, "{found}");

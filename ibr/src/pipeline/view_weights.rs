@@ -1,10 +1,8 @@
 //! The share of each view in the virtual one, and its exposure.
 
-use super::depth_errors::median;
 use super::exposure::drifts;
 use super::{Agreement, Exposure};
-use crate::camera::Camera;
-use crate::propagate::{CalibratedView, View, Viewpoint};
+use crate::propagate::{View, Viewpoint};
 use crate::sample::Sample;
 
 /// Keeps the weights finite at the place of a view, where that view then weighs this much more than its
@@ -26,17 +24,27 @@ const LEAST_VARIANCE: f64 = 1.0;
 /// Half-way between two views both weigh 1. The weights change continuously along any path of the virtual
 /// camera, so a sequence of views does not pulse.
 ///
-/// Of general cameras, the distance of a view is the sum of two, both in units of the distance to the scene:
-/// that of the camera centres, and that of the directions from which they look at the middle of the scene.
-/// If only the k nearest views are used, w_i is multiplied by (x_(k+1) - x_i) / (x_(k+1) - x_(1)), with the
+/// Only the k nearest views are used: w_i is multiplied by (x_(k+1) - x_i) / (x_(k+1) - x_(1)), with the
 /// distances of the first view that is left out and of the nearest, so that a view enters and leaves without
 /// a jump (Buehler et al., Unstructured Lumigraph Rendering, SIGGRAPH 2001).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewWeights {
     weights: Vec<f32>,
     distances: Vec<f64>,
+    /// What the noise of each view adds to the inverse of its weight; empty if it is not known.
+    excess: Vec<f64>,
     /// Factors that give the views one exposure; empty if they are not wanted.
     gains: Vec<[f32; 3]>,
+}
+
+/// The weight at one of some distances, which are sorted.
+pub(super) fn weight_of(distance: f64, sorted: &[f64]) -> f64 {
+    let scale = sorted.iter().take(2).sum::<f64>();
+    if sorted.len() < 2 || scale <= 0.0 {
+        return 1.0;
+    }
+    let x = (distance / scale).min(1.0);
+    (1.0 - x + SOFTENING) / (x + SOFTENING)
 }
 
 impl ViewWeights {
@@ -44,46 +52,15 @@ impl ViewWeights {
     pub fn by_distance(distances: &[f64]) -> Self {
         let mut sorted = distances.to_vec();
         sorted.sort_by(f64::total_cmp);
-        let scale = sorted.iter().take(2).sum::<f64>();
-        let weight = |distance: &f64| {
-            let x = (distance / scale).min(1.0);
-            ((1.0 - x + SOFTENING) / (x + SOFTENING)) as f32
-        };
-        let weights = match sorted.len() > 1 && scale > 0.0 {
-            true => distances.iter().map(weight).collect(),
-            false => vec![1.0; distances.len()],
-        };
-        Self { weights, distances: distances.to_vec(), gains: Vec::new() }
+        let weights = distances.iter().map(|distance| weight_of(*distance, &sorted) as f32).collect();
+        Self { weights, distances: distances.to_vec(), excess: Vec::new(), gains: Vec::new() }
     }
 
-    /// The same for views whose surfaces are displaced: w_i is multiplied by (d_2 / d_i)^4 beyond the second
-    /// least distance d_2.
-    ///
-    /// Surfaces from tracks alone err between the tracks, in all views alike and more with the distance, so
-    /// of two views on both sides of the virtual one the displacements cancel, and those of others are left.
-    /// Three and four views of Model House were up to 0.38 dB below the two without this factor.
-    pub(super) fn faded(mut self) -> Self {
-        let mut sorted = self.distances.clone();
-        sorted.sort_by(f64::total_cmp);
-        let second = sorted.get(1).copied().unwrap_or(f64::INFINITY);
-        for (weight, distance) in self.weights.iter_mut().zip(&self.distances) {
-            *weight *= if *distance > second { (second / distance).powi(4) as f32 } else { 1.0 };
-        }
-        self
-    }
-
-    /// The two views that weigh most, of at least two.
-    pub(super) fn first_two(&self) -> [usize; 2] {
-        let mut order: Vec<usize> = (0..self.weights.len()).collect();
-        order.sort_by(|a, b| self.weights[*b].total_cmp(&self.weights[*a]));
-        [order[0], order[1]]
-    }
-
-    /// The same with the `count` nearest views only; all if there is no number.
-    pub fn nearest(mut self, count: Option<usize>) -> Self {
+    /// The same with the `count` nearest views only.
+    pub fn nearest(mut self, count: usize) -> Self {
         let mut order: Vec<usize> = (0..self.distances.len()).collect();
         order.sort_by(|a, b| self.distances[*a].total_cmp(&self.distances[*b]));
-        let Some((chosen, rest)) = count.and_then(|count| order.split_at_checked(count)) else { return self };
+        let Some((chosen, rest)) = order.split_at_checked(count) else { return self };
         let (Some(first), Some(out)) = (chosen.first(), rest.first()) else { return self };
         let (least, limit) = (self.distances[*first], self.distances[*out]);
         for view in chosen {
@@ -110,22 +87,11 @@ impl ViewWeights {
         Self::by_distance(&distances)
     }
 
-    /// As [`ViewWeights::of`], with the distances in position and direction.
-    pub fn by_angle(views: &[CalibratedView<'_>], camera: &Camera) -> Self {
-        let centre = camera.centre();
-        let mut reaches: Vec<f64> = views.iter().filter_map(|v| v.map.middle()).map(f64::from).collect();
-        let Some(reach) = median(&mut reaches) else {
-            return Self::of(views, camera);
-        };
-        let pivot = centre + camera.axis() * reach;
-        let distance = |view: &CalibratedView<'_>| {
-            let from = view.camera.centre();
-            let angle = (from - pivot).angle(&(centre - pivot));
-            // The axis of a view that looks past the scene is far from the direction to its middle.
-            let turn = view.camera.axis().angle(&(pivot - from));
-            (from - centre).norm() / reach + angle + turn
-        };
-        Self::by_distance(&views.iter().map(distance).collect::<Vec<_>>())
+    /// The same with some views only.
+    pub(super) fn only(mut self, chosen: &[usize]) -> Self {
+        let left_out = self.weights.iter_mut().enumerate().filter(|(view, _)| !chosen.contains(view));
+        left_out.for_each(|(_, weight)| *weight = 0.0);
+        self
     }
 
     /// The same for photographs of unequal noise.
@@ -144,11 +110,15 @@ impl ViewWeights {
         let variance = variance.max(LEAST_VARIANCE);
         let noise = |view: usize| agreement.noise(view);
         let least = self.views().into_iter().map(noise).fold(f64::INFINITY, f64::min);
-        for (view, weight) in self.weights.iter_mut().enumerate() {
-            let excess = (noise(view) - least).max(0.0);
-            *weight = (variance / (variance / f64::from(*weight) + excess)) as f32;
-        }
+        self.excess = (0..self.weights.len()).map(|view| (noise(view) - least).max(0.0) / variance).collect();
+        self.weights = (0..).zip(&self.weights).map(|(view, w)| self.noisy(view, f64::from(*w))).collect();
         self
+    }
+
+    /// The weight of a view where it would have this one without noise.
+    pub(super) fn noisy(&self, view: u16, weight: f64) -> f32 {
+        let excess = self.excess.get(usize::from(view)).copied().unwrap_or(0.0);
+        (1.0 / (1.0 / weight + excess)) as f32
     }
 
     /// The same with factors for the colours of the views, with which all have those of the first. As far as
@@ -247,59 +217,19 @@ mod tests {
 
     #[test]
     fn the_nearest_views_are_used() {
-        let two = ViewWeights::by_distance(&[3.0, 1.0, 2.0, 9.0]).nearest(Some(2));
+        let two = ViewWeights::by_distance(&[3.0, 1.0, 2.0, 9.0]).nearest(2);
         assert_eq!(two.views(), [1, 2]);
         assert!(two.weights[1] > two.weights[2] && !two.uses(0));
         let all = ViewWeights::by_distance(&[3.0, 1.0]);
-        assert_eq!((all.clone().nearest(Some(2)), all.clone().nearest(None)), (all.clone(), all));
-        assert_eq!(ViewWeights::by_distance(&[1.0, 1.0, 1.0]).nearest(Some(2)).views(), [0, 1]);
-    }
-
-    #[test]
-    fn views_beyond_the_two_nearest_fade() {
-        let plain = ViewWeights::by_distance(&[1.0, 2.0, 0.9, 1.1]);
-        let faded = plain.clone().faded();
-        let factors: Vec<f32> = faded.weights.iter().zip(&plain.weights).map(|(a, b)| a / b).collect();
-        let want = [1.0, 0.0625, 1.0, 1.1_f32.powi(-4)];
-        assert!(factors.iter().zip(want).all(|(a, b)| (a - b).abs() < 1e-6), "{factors:?}");
-        let alone = ViewWeights::by_distance(&[3.0]);
-        assert_eq!(alone.clone().faded(), alone);
-        // Continuous where two views change places.
-        let at = |d: f64| ViewWeights::by_distance(&[1.0, 2.0 - d, 2.0 + d]).faded().weights;
-        let (a, b) = (at(-1e-4), at(1e-4));
-        assert!(a.iter().zip(&b).all(|(a, b)| (a / b - 1.0).abs() < 2e-3), "{a:?} {b:?}");
-    }
-
-    /// Of two views at one distance, the one that looks at the scene from a similar direction is nearer, and
-    /// one that looks away is the farthest.
-    #[test]
-    fn directions_count_too() {
-        let image = crate::image::Image::filled(4, 3, 1, 0.0);
-        let depth =
-            crate::depth::DepthMap::new((4, 3), vec![5.0; 12], 1.0, crate::depth::Measure::Depth).unwrap();
-        let view = |centre: [f64; 3], yaw: f64| {
-            let r = nalgebra::Rotation3::from_euler_angles(0.0, yaw, 0.0);
-            let mut matrix = nalgebra::Matrix3x4::zeros();
-            matrix.fixed_columns_mut::<3>(0).copy_from(r.matrix());
-            matrix.set_column(3, &-(r * nalgebra::Vector3::from(centre)));
-            CalibratedView { image: &image, map: &depth, camera: Camera::metric(matrix, false).unwrap() }
-        };
-        let beside = view([1.0, 0.0, 0.0], 0.2);
-        let before = view([0.0, 0.0, 1.0], 0.0);
-        let away = view([0.1, 0.0, 0.0], 3.0);
-        let target = view([0.0; 3], 0.0).camera;
-        let found = ViewWeights::by_angle(&[beside, before, away], &target);
-        assert!(found.distances[1] < found.distances[0], "{:?}", found.distances);
-        assert!(found.distances[0] < found.distances[2], "{:?}", found.distances);
-        assert_eq!(found.nearest(Some(1)).views(), [1]);
+        assert_eq!(all.clone().nearest(2), all);
+        assert_eq!(ViewWeights::by_distance(&[1.0, 1.0, 1.0]).nearest(2).views(), [0, 1]);
     }
 
     #[test]
     fn weights_change_continuously_along_a_path() {
         let cameras = [0.0, 1.0, 2.5];
         let at = |c: f64| ViewWeights::by_distance(&cameras.map(|p: f64| (p - c).abs())).weights;
-        let two =
-            |c: f64| ViewWeights::by_distance(&cameras.map(|p: f64| (p - c).abs())).nearest(Some(2)).weights;
+        let two = |c: f64| ViewWeights::by_distance(&cameras.map(|p: f64| (p - c).abs())).nearest(2).weights;
         for k in 0..2500 {
             let (a, b) = (two(f64::from(k) * 1e-3), two(f64::from(k + 1) * 1e-3));
             assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 0.05), "{k}: {a:?} {b:?}");

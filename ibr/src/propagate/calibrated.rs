@@ -3,7 +3,7 @@
 mod projected;
 mod row_map;
 
-use projected::Projected;
+pub use projected::Projected;
 
 use super::{CalibratedView, Frame};
 use crate::camera::{Camera, Relative};
@@ -68,6 +68,11 @@ impl Footprint {
         self.tiles.len() * TILE
     }
 
+    /// The pixels of the chosen views.
+    pub(crate) fn pixels(&self) -> usize {
+        self.pixels
+    }
+
     /// Pixels outside the frame or without depth, if this many are samples.
     pub(crate) fn dropped(&self, samples: usize) -> Dropped {
         let (unknown, behind) = (self.unknown, self.behind);
@@ -85,7 +90,7 @@ impl Footprint {
         let band = self.frame.band(own.0 - reach, own.1 + reach);
         for tile in self.reaching(own, |spacing| REACH * test.radius(spacing)) {
             let view = usize::from(tile.view);
-            projected.push(&views[view], &self.maps[view], tile, &band, own);
+            projected.push(&views[view], &self.maps[view], tile, &band, own, test);
         }
         projected
     }

@@ -4,13 +4,14 @@ mod calibrated;
 mod view;
 
 pub(crate) use calibrated::Footprint;
+pub use calibrated::Projected;
 #[cfg(test)]
 pub(crate) use calibrated::tests::calibrated;
 pub(crate) use view::nearest;
 pub use view::{CalibratedView, RectifiedView, View, Viewpoint};
 
 use crate::depth::TILE;
-use crate::occlusion::LARGEST_SPACING;
+use crate::occlusion::{DepthTest, LARGEST_SPACING};
 use crate::sample::{Dropped, Sample};
 
 /// The part of the virtual image plane in which samples are kept.
@@ -59,6 +60,8 @@ pub struct RigCamera {
     pub position: f64,
     /// Added to every disparity, it gives a positive number in inverse proportion to depth.
     pub disparity_offset: f64,
+    /// What separates surfaces, with the errors of the disparities.
+    pub test: DepthTest,
 }
 
 impl RigCamera {
@@ -66,7 +69,8 @@ impl RigCamera {
     /// all views have one order of depth.
     pub fn new(views: &[RectifiedView<'_>], position: f64) -> Self {
         let offsets = views.iter().map(|v| v.map.offset());
-        Self { position, disparity_offset: offsets.reduce(f64::max).unwrap_or(0.0) }
+        let disparity_offset = offsets.reduce(f64::max).unwrap_or(0.0);
+        Self { position, disparity_offset, test: DepthTest::default() }
     }
 }
 
@@ -116,7 +120,7 @@ pub fn rectified_row<const C: usize>(
     let (width, shift) = (view.image.width(), view.camera - camera.position);
     let mut dropped = Dropped::default();
     for start in (0..width).step_by(TILE) {
-        let reliefs = view.map.reliefs(start, y);
+        let reliefs = view.map.reliefs(start, y, &camera.test);
         for (i, disparity) in view.map.row(y)[start..].iter().take(TILE).enumerate() {
             let (pixel, disparity) = (y * width + start + i, f64::from(*disparity));
             if disparity.is_nan() {

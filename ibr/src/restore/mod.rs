@@ -10,12 +10,10 @@
 //!    [`Agreement`](crate::pipeline::Agreement) finds from the lookups of one map in another, and the bends
 //!    kappa of the surfaces, the map is the most probable one of a random walk of slopes (`surface`).
 
-mod colour;
 mod outliers;
 mod scattered;
 mod surface;
 
-pub use colour::coloured;
 pub(crate) use scattered::dense;
 pub(crate) use surface::from_scattered;
 

@@ -167,11 +167,6 @@ impl Parallax {
         Some(self.values[y * self.width + x]).filter(|value| !value.is_nan())
     }
 
-    /// The pixel at a position whose surface has this parallax.
-    pub(super) fn showing(&self, at: [f64; 2], there: f32) -> Option<usize> {
-        self.pixels_at(at).find(|q| self.agree(there, self.values[*q]))
-    }
-
     /// The known pixels around a position, none outside the image.
     fn pixels_at(&self, [u, v]: [f64; 2]) -> impl Iterator<Item = usize> {
         let inside = |at: f64, side: usize| at > -0.5 && at < side as f64 - 0.5;

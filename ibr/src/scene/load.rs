@@ -12,22 +12,23 @@ mod uncalibrated;
 
 pub use complete::complete;
 pub use goals::MOST_FRAMES;
+pub(crate) use maps::photograph;
 
-use super::prepare::{Preparation, prepare};
+use super::prepare::{Preparation, PrepareSettings, prepare};
 use super::spec::{KEYS, SceneSpec, ViewSpec};
+use super::unknown::Unknown;
 use super::{Kind, Scene};
-use crate::camera::middlebury::Calibration;
 use crate::files::InputError;
 use crate::image::{Image, MOST_PIXELS, read_image};
-use crate::pipeline::Watch;
 use goals::Goal;
 use hybank_core::messages::{self, Number, Quoted, of_document};
 use left_out::LeftOut;
 use models::Models;
 use rayon::prelude::*;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::Mutex;
 
 /// How a scene is read.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,15 +37,26 @@ pub struct LoadOptions {
     pub view: Option<String>,
     /// Use only every K-th value of full maps.
     pub depth_step: usize,
-    /// Whether unknown depths are filled from their neighbours, by `fill_unknown`.
-    pub fill: bool,
+    /// What unknown depths are taken for, whatever the scene says.
+    pub unknown: Option<Unknown>,
+    /// Use only so many views, those nearest to the virtual camera.
+    pub nearest: Option<usize>,
+    /// Do not correct small errors of the cameras.
+    pub keep_cameras: bool,
     /// The most pixels of the virtual view, and of each image and map.
     pub max_pixels: usize,
 }
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { view: None, depth_step: 1, fill: true, max_pixels: MOST_PIXELS }
+        Self {
+            view: None,
+            depth_step: 1,
+            unknown: None,
+            nearest: None,
+            keep_cameras: false,
+            max_pixels: MOST_PIXELS,
+        }
     }
 }
 
@@ -62,20 +74,29 @@ pub fn parse(text: &str, path: &Path) -> Result<SceneSpec, InputError> {
     })
 }
 
-/// Reads all files of a scene. Relative paths start in the folder of the scene file `path`. `watch` is
-/// called with the share of the views that are read.
+/// Reads all files of a scene. Relative paths start in the folder of the scene file `path`.
 ///
 /// # Errors
 /// [`InputError`], naming file, view and numbers.
-pub fn load(
+pub fn load(spec: &SceneSpec, path: &Path, options: &LoadOptions) -> Result<Scene, InputError> {
+    Loader::new(&complete(spec, path)?, path, options).load(options.view.as_deref())
+}
+
+/// The scene for the place of each of some views, which is left out; `with` takes its number among them. The
+/// files of cameras are read once.
+///
+/// # Errors
+/// [`InputError`], or what `with` returns.
+pub fn each_left_out<E: From<InputError>>(
     spec: &SceneSpec,
     path: &Path,
     options: &LoadOptions,
-    watch: Watch<'_>,
-) -> Result<Scene, InputError> {
-    let spec = &complete(spec, path)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    Loader { spec, path, folder, options, watch, models: Models::default() }.load()
+    views: &[String],
+    mut with: impl FnMut(usize, Scene) -> Result<(), E>,
+) -> Result<(), E> {
+    let spec = complete(spec, path)?;
+    let loader = Loader::new(&spec, path, options);
+    views.iter().enumerate().try_for_each(|(index, view)| with(index, loader.load(Some(view))?))
 }
 
 struct Loader<'a> {
@@ -83,8 +104,9 @@ struct Loader<'a> {
     path: &'a Path,
     folder: &'a Path,
     options: &'a LoadOptions,
-    watch: Watch<'a>,
     models: Models,
+    /// Depths of maps that were looked at before the views were chosen.
+    quartiles: Mutex<BTreeMap<PathBuf, Vec<f64>>>,
 }
 
 type Loaded<T> = Result<T, InputError>;
@@ -92,15 +114,24 @@ type Loaded<T> = Result<T, InputError>;
 /// What was read of a scene.
 struct Inputs {
     kind: Kind,
-    calibration: Option<Calibration>,
+    /// Of each view its number among those that are not left out.
+    numbers: Vec<usize>,
+    /// Of each view the pixels that show no part of the scene; empty if all do.
+    hidden: Vec<Vec<bool>>,
     /// What was decided, for the user.
     notes: Vec<String>,
 }
 
-impl Loader<'_> {
-    fn load(&self) -> Loaded<Scene> {
+impl<'a> Loader<'a> {
+    fn new(spec: &'a SceneSpec, path: &'a Path, options: &'a LoadOptions) -> Self {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Self { spec, path, folder, options, models: Models::default(), quartiles: Mutex::default() }
+    }
+
+    /// The scene, for the place of a view if one is left out.
+    fn load(&self, left_out: Option<&str>) -> Loaded<Scene> {
         self.different_names()?;
-        let left_out = self.left_out()?;
+        let left_out = left_out.map(|view| self.left_out(view)).transpose()?;
         let mut views: Vec<&ViewSpec> = self.spec.view.iter().collect();
         let own = match left_out {
             Some(LeftOut::View(index)) => Some((index, views.remove(index))),
@@ -110,24 +141,24 @@ impl Loader<'_> {
             return Err(self.incomplete("there is no view to render from; add [[view]] tables"));
         }
         let goals = self.goals()?;
-        let Inputs { mut kind, calibration, mut notes } = if views.iter().any(|v| v.position.is_some()) {
+        let Inputs { mut kind, numbers, hidden, mut notes } = if views.iter().any(|v| v.position.is_some()) {
             self.rectified(&views, own.map(|(_, view)| view), &goals)?
         } else if views.iter().any(|v| v.camera.is_some() || self.source_of(v).is_some()) {
             self.calibrated(&views, left_out.as_ref(), &goals)?
         } else {
             self.uncalibrated(&views, own, &goals)?
         };
-        notes.extend(self.spec.notes.iter().cloned());
-        notes.extend(note_of_dark(&kind.images()));
-        let Preparation { filled, outliers, coloured } = match &mut kind {
-            Kind::Rectified { views, .. } => prepare(views, self.options.fill),
-            Kind::Calibrated { views, .. } => prepare(views, self.options.fill),
+        let unknown = self.options.unknown.or(self.spec.unknown).unwrap_or_default();
+        let settings = PrepareSettings { unknown, keep_cameras: self.options.keep_cameras, hidden: &hidden };
+        let prepared = match &mut kind {
+            Kind::Rectified { views, .. } => prepare(views, &settings),
+            Kind::Calibrated { views, .. } => prepare(views, &settings),
             Kind::Uncalibrated { .. } => Preparation::default(),
         };
-        notes.extend(note_of_outliers(&outliers));
-        notes.extend(note_of_grey(&coloured));
-        let names = views.iter().map(|view| view.label()).collect();
-        Ok(Scene { kind, names, offset: self.offset(&goals)?, filled, outliers, calibration, notes })
+        let Preparation { filled, outliers, faults, notes: changes, .. } = prepared;
+        notes.extend(faults.into_iter().chain(changes));
+        let names = numbers.iter().map(|number| views[*number].label()).collect();
+        Ok(Scene { kind, names, offset: self.offset(&goals)?, filled, outliers, notes })
     }
 
     /// That the scene file contradicts itself, or what it lacks.
@@ -187,64 +218,9 @@ impl Loader<'_> {
     }
 }
 
-/// Largest value of 12 bits in 16 on the scale of 255, rounded up.
-const TWELVE_BITS: f32 = 16.0;
-
-/// That photographs are as dark as data of 12 bits in files of 16. Those of files of 8 bits have whole
-/// numbers.
-fn note_of_dark(images: &[&Image]) -> Option<String> {
-    let is_dark = |image: &Image| {
-        image.data().iter().all(|v| *v < TWELVE_BITS) && image.data().iter().any(|v| v.fract() != 0.0)
-    };
-    let dark: Vec<String> =
-        (1..).zip(images).filter(|(_, i)| is_dark(i)).map(|(k, _)| k.to_string()).collect();
-    (!dark.is_empty()).then(|| {
-        format!(
-            "no value of view {} is above a sixteenth of white; data of 12 bits in files of 16 must be multiplied by 16",
-            dark.join(", ")
-        )
-    })
-}
-
-/// Share of outliers from which on a report names them.
-const MANY_OUTLIERS: f64 = 0.005;
-
-fn note_of_outliers(shares: &[f64]) -> Option<String> {
-    let most = shares.iter().copied().fold(0.0, f64::max);
-    (most >= MANY_OUTLIERS).then(|| {
-        let percent: Vec<String> = shares.iter().map(|share| format!("{:.1}", 100.0 * share)).collect();
-        format!(
-            "{} % of the depths of the views contradict their neighbours, and other views do not outvote these; they were replaced",
-            percent.join(", ")
-        )
-    })
-}
-
-/// That grey photographs took colours; `views` are their numbers.
-fn note_of_grey(views: &[usize]) -> Option<String> {
-    let numbers: Vec<String> = views.iter().map(|view| (view + 1).to_string()).collect();
-    let are = if views.len() == 1 { "is" } else { "are" };
-    (!views.is_empty()).then(|| {
-        format!(
-            "view {} {are} grey beside coloured ones: what the others show gives the colour, the grey photographs the luminance",
-            numbers.join(", ")
-        )
-    })
-}
-
 /// What `read` makes of each view, or the first error in the order of the views, so that every run reports
 /// the same error.
-fn each<V: Sync, T: Send>(
-    views: &[V],
-    read: impl Fn(&V) -> Loaded<T> + Sync,
-    watch: Watch<'_>,
-) -> Loaded<Vec<T>> {
-    let ready = AtomicUsize::new(0);
-    let read = |view: &V| {
-        let done = read(view);
-        watch((ready.fetch_add(1, Ordering::Relaxed) + 1) as f64 / views.len() as f64);
-        done
-    };
+fn each<V: Sync, T: Send>(views: &[V], read: impl Fn(&V) -> Loaded<T> + Sync + Send) -> Loaded<Vec<T>> {
     views.par_iter().map(read).collect::<Vec<_>>().into_iter().collect()
 }
 

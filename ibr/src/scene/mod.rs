@@ -1,17 +1,23 @@
 //! Scenes: TOML files that list views (images, maps, cameras) and describe the virtual view.
 
+mod diagnosis;
 mod folder;
 mod load;
+mod notes;
 mod prepare;
+mod register;
 mod spec;
+mod unknown;
 
 pub use folder::{Described, describe};
-pub use load::{LoadOptions, MOST_FRAMES, complete, load, parse};
-pub use prepare::{Preparation, prepare};
+pub(crate) use load::photograph;
+pub use load::{LoadOptions, MOST_FRAMES, complete, each_left_out, load, parse};
+pub use prepare::{Preparation, PrepareSettings, prepare};
+pub use register::Registered;
 pub use spec::{SceneSpec, TargetSpec, ViewSpec};
+pub use unknown::Unknown;
 
 use crate::camera::Camera;
-use crate::camera::middlebury::Calibration;
 use crate::depth::DepthMap;
 use crate::image::Image;
 use crate::pipeline::uncalibrated::Target;
@@ -23,7 +29,7 @@ use crate::uncalibrated::Point;
 pub struct Scene {
     /// The kind of scene, with its views.
     pub kind: Kind,
-    /// The name of each view, or its image file.
+    /// The name of each view that was read, or its image file.
     pub names: Vec<String>,
     /// Registration offset of the virtual view in pixels.
     pub offset: f64,
@@ -32,8 +38,6 @@ pub struct Scene {
     /// Share of the values of each map that contradicted their neighbours and the other views, and were
     /// replaced.
     pub outliers: Vec<f64>,
-    /// The calibration file of a rectified rig, which gives its disparities a unit.
-    pub calibration: Option<Calibration>,
     /// What was decided on reading; it is reported to the user.
     pub notes: Vec<String>,
 }

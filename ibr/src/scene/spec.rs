@@ -1,5 +1,6 @@
 //! A scene file as written.
 
+use super::unknown::Unknown;
 use crate::camera::colmap::model_files;
 use hybank_core::messages::Quoted;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
@@ -27,19 +28,17 @@ pub struct SceneSpec {
     /// File of cameras of neural rendering (`transforms.json`); without `[[view]]` tables its frames with
     /// depth are the views.
     pub transforms: Option<PathBuf>,
-    /// Calibration file of the Middlebury benchmark; without `[[view]]` tables the pair beside it is the
-    /// views.
-    pub calib: Option<PathBuf>,
+    /// The `depth` of views that do not say it themselves.
+    pub depth: Option<PathBuf>,
     /// Whether the world frame of the cameras is left-handed.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub mirrored: bool,
+    /// What unknown depths are taken for.
+    pub unknown: Option<Unknown>,
     /// Stored value / scale = disparity, in views that do not say it themselves.
     pub disparity_scale: Option<f64>,
     /// Stored value / scale = depth, in views that do not say it themselves.
     pub depth_scale: Option<f64>,
-    /// What [`complete`](super::complete) decided; it is reported to the user.
-    #[serde(skip)]
-    pub notes: Vec<String>,
 }
 
 /// A view.
@@ -61,9 +60,11 @@ pub struct ViewSpec {
     pub disparity_offset: Option<f64>,
     /// 3 x 4 camera matrix, in pixels.
     pub camera: Option<[[f64; 4]; 3]>,
-    /// Depth map of a general rig, or `matched` or `points`: it is found from the photographs, or is that of
-    /// the points of the COLMAP model.
+    /// Depth map of a general rig, or a mesh (`.ply`), or `matched` or `points`: it is found from the
+    /// photographs, or is that of the points of the COLMAP model.
     pub depth: Option<PathBuf>,
+    /// Image that is black where the photograph shows what is no part of the scene.
+    pub mask: Option<PathBuf>,
     /// Stored value / scale = depth.
     pub depth_scale: Option<f64>,
     /// Folder of a COLMAP model that holds the camera of this view.
@@ -82,6 +83,9 @@ pub struct TargetSpec {
     pub position: Option<f64>,
     /// 3 x 4 camera matrix, in pixels.
     pub camera: Option<[[f64; 4]; 3]>,
+    /// Cameras of other views than those of the scene: a camera path of nerfstudio, a transforms file or the
+    /// folder of a COLMAP model. All of them are rendered, or the one of `camera_of`.
+    pub cameras: Option<PathBuf>,
     /// Name of the image of the COLMAP model or transforms file whose camera is used.
     pub camera_of: Option<String>,
     /// Position at the end of a path along the baseline.
@@ -108,6 +112,8 @@ pub struct TargetSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum MapSource<'a> {
     File(&'a Path),
+    /// A mesh, or a cloud of points.
+    Mesh(&'a Path),
     /// The points of the COLMAP model that has the cameras.
     Points,
     /// The photographs beside this one.
@@ -120,6 +126,7 @@ impl<'a> MapSource<'a> {
         match map.to_str() {
             Some("points") => Self::Points,
             Some("matched") => Self::Matched,
+            _ if map.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("ply")) => Self::Mesh(map),
             _ => Self::File(map),
         }
     }
@@ -130,10 +137,12 @@ impl SceneSpec {
     /// `folder`.
     pub fn files(&self, folder: &Path) -> Vec<PathBuf> {
         let images = self.view.iter().map(|view| &view.image);
-        let maps = self.view.iter().flat_map(|view| [&view.disparity, &view.depth]).flatten();
-        let maps = maps.filter(|map| matches!(MapSource::of(map), MapSource::File(_)));
-        let lists = [&self.matches, &self.transforms, &self.calib].into_iter().flatten();
-        let models = self.view.iter().map(|view| &view.colmap).chain([&self.colmap]).flatten();
+        let maps = self.view.iter().flat_map(|view| [&view.disparity, &view.depth, &view.mask]);
+        let maps = maps.chain([&self.depth]).flatten();
+        let maps = maps.filter(|map| matches!(MapSource::of(map), MapSource::File(_) | MapSource::Mesh(_)));
+        let cameras = self.targets.iter().map(|target| &target.cameras);
+        let lists = [&self.matches, &self.transforms].into_iter().chain(cameras.clone()).flatten();
+        let models = self.view.iter().map(|view| &view.colmap).chain([&self.colmap]).chain(cameras).flatten();
         let models = models.flat_map(|model| model_files().map(|file| model.join(file)));
         let files = images.chain(maps).chain(lists).cloned().chain(models);
         files.map(|file| folder.join(file)).collect()
@@ -146,22 +155,24 @@ impl SceneSpec {
 }
 
 /// Keys that not all kinds of scenes have, whichever table they are in, with the kinds that have them.
-pub(super) const KEYS: [(&str, &str); 21] = [
+pub(super) const KEYS: [(&str, &str); 23] = [
     ("matches", "matches-only"),
     ("transforms", "calibrated"),
-    ("calib", "rectified"),
     ("mirrored", "calibrated"),
+    ("unknown", "rectified, calibrated"),
     ("disparity", "rectified"),
     ("disparity_scale", "rectified"),
     ("disparity_offset", "rectified"),
     ("position", "rectified"),
     ("to_position", "rectified"),
     ("camera", "calibrated"),
+    ("cameras", "calibrated"),
     ("camera_of", "calibrated"),
     ("to_camera", "calibrated"),
     ("to_camera_of", "calibrated"),
     ("depth", "calibrated"),
     ("depth_scale", "calibrated"),
+    ("mask", "rectified, calibrated"),
     ("colmap", "calibrated"),
     ("step", "rectified, calibrated"),
     ("column", "matches-only"),
@@ -172,8 +183,12 @@ pub(super) const KEYS: [(&str, &str); 21] = [
 
 impl TargetSpec {
     /// Keys of which a virtual view has one at most.
-    pub(super) const EITHER: [[&'static str; 2]; 3] =
-        [["camera", "camera_of"], ["to_camera", "to_camera_of"], ["from_tracks", "between"]];
+    pub(super) const EITHER: [[&'static str; 2]; 4] = [
+        ["camera", "cameras"],
+        ["camera", "camera_of"],
+        ["to_camera", "to_camera_of"],
+        ["from_tracks", "between"],
+    ];
 
     /// Whether the end of a path is given.
     pub(super) fn has_end(&self) -> bool {

@@ -68,11 +68,6 @@ impl Handedness {
         if self == Self::Kept { 1.0 } else { -1.0 }
     }
 
-    /// The other order.
-    pub fn reversed(self) -> Self {
-        if self == Self::Kept { Self::Reversed } else { Self::Kept }
-    }
-
     /// The bit for which chi of this oriented camera grows (`slope` > 0) or falls with 1 / d.
     pub fn from_slope(camera: &Matrix3x4<f64>, slope: f64) -> Self {
         if -slope * centre_sign(camera) > 0.0 { Self::Kept } else { Self::Reversed }

@@ -7,7 +7,6 @@
 //! by chi = -(X_p)_4 / (pi3_p . X_p), which along every viewing ray is an affine function of the true
 //! inverse depth.
 
-pub mod bundle;
 pub mod canonical;
 pub mod chirality;
 pub mod flips;

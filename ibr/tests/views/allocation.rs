@@ -1,12 +1,12 @@
 //! The rows of a rendering allocate nothing once their work memory has grown to the longest row.
 
+use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use hybank_ibr::camera::Camera;
 use hybank_ibr::interpolate::rows::{self, RowWork};
 use hybank_ibr::interpolate::{Cover, Settings};
 use hybank_ibr::occlusion::{RowScratch, remove_in_row};
 use hybank_ibr::propagate::{Frame, RectifiedView, RigCamera, rectified_row};
 use hybank_ibr::sample::Sample;
-use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 
 const SIZE: (usize, usize) = (160, 40);
 

@@ -4,10 +4,11 @@
 
 use crate::support::bilinear::bilinear;
 use crate::support::noise::noisy;
+use crate::support::render::of_rig;
 use hybank_ibr::depth::{DepthMap, Measure};
 use hybank_ibr::image::{Image, quality};
 use hybank_ibr::partial::densify;
-use hybank_ibr::pipeline::{Method, RenderSettings, rectified};
+use hybank_ibr::pipeline::RenderSettings;
 use hybank_ibr::propagate::RectifiedView;
 
 const WIDTH: usize = 200;
@@ -175,16 +176,12 @@ fn every_kind_of_scene_is_held_against_rounding() {
         let views = [view(0), view(1)];
         for (position, margin) in [0.5, 0.3].into_iter().zip(margins) {
             let (truth, _) = record(&layers, position);
-            let render = |method| {
-                let settings = RenderSettings { method, ..RenderSettings::default() };
-                psnr(&rectified::render(&views, position, &settings).unwrap().image, &truth, None)
-            };
             let baseline = psnr(&rounded(&views, position), &truth, None);
             let copy = psnr(&ends[0].0, &truth, None);
-            let (rows, plane) = (render(Method::Auto), render(Method::Plane));
-            let figures = format!(
-                "{name} at {position}: rows {rows:.2}, plane {plane:.2}, rounded {baseline:.2}, copy {copy:.2} dB"
-            );
+            let rows = of_rig(&views, position, &RenderSettings::default()).image;
+            let rows = psnr(&rows, &truth, None);
+            let figures =
+                format!("{name} at {position}: rows {rows:.2}, rounded {baseline:.2}, copy {copy:.2} dB");
             println!("{figures}");
             if !(rows > baseline + margin && rows > copy + 5.0) {
                 behind.push(figures);
@@ -211,9 +208,8 @@ fn gain_of_smoothing(layers: &[Layer], noise: [f64; 2]) -> f64 {
     let (truth, _) = record(layers, 0.5);
     let images = [noisy(&ends[0].0, noise[0], 1), noisy(&ends[1].0, noise[1], 2)];
     let view = |i: usize| RectifiedView { image: &images[i], map: &ends[i].1, camera: i as f64 };
-    let quality = |settings: &RenderSettings| {
-        psnr(&rectified::render(&[view(0), view(1)], 0.5, settings).unwrap().image, &truth, None)
-    };
+    let quality =
+        |settings: &RenderSettings| psnr(&of_rig(&[view(0), view(1)], 0.5, settings).image, &truth, None);
     let fixed = RenderSettings { keep_smoothing: true, ..RenderSettings::default() };
     quality(&RenderSettings::default()) - quality(&fixed)
 }
@@ -230,7 +226,7 @@ fn every_kind_of_scene_profits_from_the_image_where_depth_is_coarse() {
             };
             let maps = [dense(0), dense(1)];
             let view = |i: usize| RectifiedView { image: &ends[i].0, map: &maps[i], camera: i as f64 };
-            let done = rectified::render(&[view(0), view(1)], 0.5, &RenderSettings::default()).unwrap();
+            let done = of_rig(&[view(0), view(1)], 0.5, &RenderSettings::default());
             psnr(&done.image, &truth, None)
         };
         let (spline, bilinear) = (render(true), render(false));

@@ -10,5 +10,7 @@ mod morph;
 mod mutations;
 mod ray_traced;
 mod support;
+#[path = "../../examples/demo/synthetic.rs"]
+mod synthetic;
 mod thesis_page;
 mod two_planes;

@@ -3,7 +3,6 @@
 
 use hybank_ibr::camera::CameraList;
 use hybank_ibr::camera::colmap::parse_model;
-use hybank_ibr::camera::middlebury::parse_calibration;
 use hybank_ibr::camera::transforms::parse_transforms;
 use hybank_ibr::image::{Image, Levels, MOST_PIXELS, encode, pfm, read_image, read_map};
 use hybank_ibr::scene::parse;
@@ -123,21 +122,9 @@ fn transforms_files() {
 }
 
 #[test]
-fn calibration_files() {
-    let seed = b"cam0=[3997.684 0 1176.728; 0 3997.684 1011.728; 0 0 1]\ncam1=[3997.684 0 1307.839; 0 3997.684 1011.728; 0 0 1]\ndoffs=131.111\nbaseline=193.001\nwidth=2964\nheight=1988\nndisp=280\n";
-    survive(&[seed], |bytes| {
-        let read = parse_calibration(&String::from_utf8_lossy(bytes), Path::new("calib.txt"));
-        accepted(read.inspect(|found| {
-            assert!(found.focal > 0.0 && found.offset.is_finite() && found.baseline > 0.0);
-            assert!(found.size.0 > 0 && found.size.1 > 0);
-        }))
-    });
-}
-
-#[test]
 fn scenes() {
     let seeds: [&[u8]; 3] = [
-        b"calib = \"c.txt\"\n[[virtual]]\nposition = 0.5\n[[virtual]]\nposition = 0.5\nto_position = 1.0\nframes = 3\n",
+        b"unknown = \"far\"\n[[virtual]]\nposition = 0.5\n[[virtual]]\nposition = 0.5\nto_position = 1.0\nframes = 3\n",
         b"[[view]]\nname = \"l\"\nimage = \"a.png\"\nposition = 0.0\ndisparity = \"d.pfm\"\nstep = 2\n[virtual]\nposition = 0.5\n",
         b"matches = \"t\"\n[[view]]\nimage = \"a\"\ncamera = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]\n[virtual]\nsize = [4, 3]\n",
     ];

@@ -8,8 +8,6 @@ use hybank_ibr::pipeline::uncalibrated::{
 };
 use hybank_ibr::uncalibrated::Point;
 use nalgebra::{Matrix3x4, Rotation3, Vector3};
-use std::sync::Mutex;
-use std::time::Instant;
 
 const SIZE: (usize, usize) = (160, 120);
 const NEAR: f64 = 4.0;
@@ -72,37 +70,34 @@ fn tracks(cameras: &[Camera]) -> Vec<Vec<Option<Point>>> {
     points.map(track).collect()
 }
 
-fn run(reverse_order: bool, mirrored: bool) -> (UncalibratedRendering, f64) {
+fn run(mirrored: bool) -> (UncalibratedRendering, f64) {
     let mut cameras = [camera(-0.5, 0.02), camera(0.5, -0.03), camera(0.05, 0.0)];
     if mirrored {
         cameras.swap(0, 1);
     }
-    run_with(reverse_order, cameras)
+    run_with(cameras)
 }
 
-fn run_with(reverse_order: bool, cameras: [Camera; 3]) -> (UncalibratedRendering, f64) {
+fn run_with(cameras: [Camera; 3]) -> (UncalibratedRendering, f64) {
     let images = [view(&cameras[0]), view(&cameras[1])];
     let all = tracks(&cameras);
     let pairs: Vec<Vec<Option<Point>>> = all.iter().map(|t| t[..2].to_vec()).collect();
     let target = Target::Tracks(all.iter().map(|t| t[2]).collect());
-    let special = UncalibratedSettings { reverse_order, ..UncalibratedSettings::default() };
+    let special = UncalibratedSettings::default();
     let settings = RenderSettings::default();
-    let done =
-        render(&[&images[0], &images[1]], &pairs, &target, SIZE, &settings, &special, &|_| ()).unwrap();
+    let done = render(&[&images[0], &images[1]], &pairs, &target, SIZE, &settings, &special).unwrap();
     let truth = view(&cameras[2]);
     let q = quality::compare(&done.rendering.image, &truth, Some(&done.region)).unwrap().unwrap();
     (done, q.psnr)
 }
 
 #[test]
-fn the_order_is_found_and_the_other_one_is_worse() {
+fn the_order_is_found() {
     for mirrored in [false, true] {
-        let (found, psnr) = run(false, mirrored);
+        let (found, psnr) = run(mirrored);
         assert!(found.geometry.order_by != OrderBy::Nothing, "{:?}", found.geometry);
-        let (other, wrong) = run(true, mirrored);
-        assert_eq!((other.geometry.order_by, other.geometry.order_agreement), (OrderBy::Given, 1.0));
         assert!(found.rendering.report.occluded > 100, "{:?}", found.rendering.report);
-        assert!(psnr > 24.0 && psnr > wrong + 1.0, "right {psnr} dB, wrong {wrong} dB");
+        assert!(psnr > 24.0, "{psnr} dB");
     }
 }
 
@@ -112,31 +107,8 @@ fn the_order_is_found_and_the_other_one_is_worse() {
 fn colours_decide_where_calibrations_mislead() {
     for shift in [-24.0, -16.0, 16.0, 24.0] {
         let cameras = [cropped(-0.5, 0.02, shift), cropped(0.5, -0.03, -shift), camera(0.05, 0.0)];
-        let (found, psnr) = run_with(false, cameras);
-        let (_, wrong) = run_with(true, cameras);
+        let (found, psnr) = run_with(cameras);
         assert_eq!(found.geometry.order_by, OrderBy::Colours, "{shift}");
-        assert!(psnr > wrong + 1.0, "{shift}: {psnr} dB, the other order {wrong} dB");
+        assert!(psnr > 24.0, "{shift}: {psnr} dB");
     }
-}
-
-/// The share of the work that is done grows from the reconstruction to the end of the fit.
-#[test]
-fn progress_is_reported_in_every_stage() {
-    let cameras = [camera(-0.5, 0.02), camera(0.5, -0.03), camera(0.05, 0.0)];
-    let images = [view(&cameras[0]), view(&cameras[1])];
-    let pairs: Vec<Vec<Option<Point>>> = tracks(&cameras[..2]);
-    let (start, shares) = (Instant::now(), Mutex::new(Vec::new()));
-    let watch = |share: f64| shares.lock().unwrap().push((share, start.elapsed().as_secs_f64()));
-    let (settings, special) = (RenderSettings::default(), UncalibratedSettings::default());
-    let views = [&images[0], &images[1]];
-    let got = render(&views, &pairs, &Target::Between(0.5), SIZE, &settings, &special, &watch).unwrap();
-    let shares = shares.into_inner().unwrap();
-    println!("shares and seconds {shares:.3?}, all {:.3} s", start.elapsed().as_secs_f64());
-    assert!(shares.windows(2).all(|pair| pair[0].0 <= pair[1].0), "{shares:?}");
-    let within = |low: f64, high: f64| shares.iter().any(|(share, _)| *share > low && *share < high);
-    assert!(within(0.0, 0.45) && within(0.45, 0.6) && within(0.6, 0.9) && within(0.9, 1.01), "{shares:?}");
-    assert_eq!(
-        got,
-        render(&views, &pairs, &Target::Between(0.5), SIZE, &settings, &special, &|_| ()).unwrap()
-    );
 }

@@ -4,15 +4,14 @@ mod uncalibrated;
 mod views;
 
 use crate::background;
-use crate::errors::{choose, refused};
+use crate::errors::{choose, refused, warn};
 use crate::results::Made;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::Measure;
 use hybank_ibr::interpolate::plane::PlaneSettings;
 use hybank_ibr::interpolate::{Cover, HoleFill};
-use hybank_ibr::pipeline::{Method, RenderError, RenderSettings, Rendering, calibrated, rectified};
-use hybank_ibr::propagate::{View, Viewpoint};
-use hybank_ibr::scene::{SourceView, prepare};
+use hybank_ibr::pipeline::{Geometry, RenderSettings, Renderer, Rendering};
+use hybank_ibr::scene::{PrepareSettings, Registered, SourceView, Unknown, prepare};
 use nalgebra::Matrix3x4;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
@@ -21,7 +20,7 @@ use views::views;
 
 /// The view from `at` on the line of rectified cameras, from images (H, W, C) and maps (H, W).
 #[pyfunction]
-#[pyo3(signature = (images, maps, positions, at, options, fill))]
+#[pyo3(signature = (images, maps, positions, at, options, unknown))]
 pub(crate) fn render_rectified<'py>(
     py: Python<'py>,
     images: Vec<PyReadonlyArray3<'_, f32>>,
@@ -29,16 +28,16 @@ pub(crate) fn render_rectified<'py>(
     positions: Vec<f64>,
     at: f64,
     options: RenderOptions,
-    fill: bool,
+    unknown: String,
 ) -> PyResult<Bound<'py, PyAny>> {
     let views = views(&images, &maps, positions, Measure::Disparity)?;
-    let settings = options.settings()?;
-    rendered(py, views, fill, move |views| rectified::render(views, at, &settings))
+    let size = views.first().map_or((0, 0), |view| view.image.size());
+    rendered(py, views, &unknown, &options, at, size)
 }
 
 /// The view of `camera` with `size` (H, W), from images, depths and cameras (3, 4).
 #[pyfunction]
-#[pyo3(signature = (images, maps, cameras, camera, size, options, fill))]
+#[pyo3(signature = (images, maps, cameras, camera, size, options, unknown))]
 #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub(crate) fn render_calibrated<'py>(
     py: Python<'py>,
@@ -48,62 +47,60 @@ pub(crate) fn render_calibrated<'py>(
     camera: PyReadonlyArray2<'_, f64>,
     size: (usize, usize),
     options: RenderOptions,
-    fill: bool,
+    unknown: String,
 ) -> PyResult<Bound<'py, PyAny>> {
     let cameras = cameras.iter().map(metric).collect::<PyResult<Vec<_>>>()?;
     let views = views(&images, &maps, cameras, Measure::Depth)?;
-    let (camera, settings) = (metric(&camera)?, options.settings()?);
-    rendered(py, views, fill, move |views| calibrated::render(views, &camera, (size.1, size.0), &settings))
+    rendered(py, views, &unknown, &options, metric(&camera)?, (size.1, size.0))
 }
 
-/// The view that `render` makes of views once their depth and colours are restored.
-fn rendered<'py, P: Viewpoint + 'static>(
+/// The view of a camera from views that are prepared first; what seems to be wrong with them is a warning.
+fn rendered<'py, P: Registered + Geometry + 'static>(
     py: Python<'py>,
     mut views: Vec<SourceView<P>>,
-    fill: bool,
-    render: impl FnOnce(&[View<'_, P>]) -> Result<Rendering, RenderError> + Send + 'static,
+    unknown: &str,
+    options: &RenderOptions,
+    camera: P,
+    size: (usize, usize),
 ) -> PyResult<Bound<'py, PyAny>> {
+    let kinds =
+        [("auto", Unknown::Auto), ("far", Unknown::Far), ("fill", Unknown::Fill), ("drop", Unknown::Drop)];
+    let (unknown, settings) = (choose("unknown", unknown, &kinds)?, options.settings()?);
+    let keep_cameras = options.keep_cameras;
     let run = move |_: &_| {
-        prepare(&mut views, fill);
-        render(&views.iter().map(SourceView::view).collect::<Vec<_>>()).map_err(|e| e.to_string())
+        let prepared = prepare(&mut views, &PrepareSettings { unknown, keep_cameras, hidden: &[] });
+        let views: Vec<_> = views.iter().map(SourceView::view).collect();
+        let rendering = Renderer::new(&views, &settings).and_then(|r| r.render(&camera, size));
+        rendering.map(|rendering| (rendering, prepared.faults)).map_err(|e| e.to_string())
     };
-    made(py, &background::run(py, None, run)?.map_err(refused)?, None, None)
+    let (rendering, faults) = background::run(py, None, run)?.map_err(refused)?;
+    faults.iter().try_for_each(|fault| warn(py, fault))?;
+    rendering.agreement.pairs.iter().filter(|pair| pair.is_poor()).try_for_each(|pair| warn(py, pair))?;
+    made(py, &rendering, None, None)
 }
 
 /// How views are rendered, by the names of the command line.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub(crate) struct RenderOptions {
-    method: String,
     fill: String,
     degree: Option<String>,
-    lambda: Option<f64>,
     offset: f64,
     nearest: Option<usize>,
     keep_exposure: bool,
+    keep_cameras: bool,
 }
 
 impl RenderOptions {
     fn settings(&self) -> PyResult<RenderSettings> {
         let Self { offset, nearest, keep_exposure, .. } = *self;
-        let methods = [("auto", Method::Auto), ("rows", Method::Rows), ("plane", Method::Plane)];
         let fills =
             [("background", HoleFill::Background), ("bridge", HoleFill::Bridge), ("leave", HoleFill::Leave)];
         let planes = [("cubic", PlaneSettings::default()), ("linear", PlaneSettings::LINEAR)];
-        let method = choose("method", &self.method, &methods)?;
-        let keep_smoothing = self.lambda.is_some();
-        let mut settings = RenderSettings {
-            method,
-            offset,
-            nearest,
-            keep_exposure,
-            keep_smoothing,
-            ..RenderSettings::default()
-        };
+        let mut settings = RenderSettings { offset, nearest, keep_exposure, ..RenderSettings::default() };
         let stage = &mut settings.interpolation;
         stage.fill = choose("fill", &self.fill, &fills)?;
         stage.plane = choose("degree", self.degree.as_deref().unwrap_or("cubic"), &planes)?;
-        stage.fit.lambda = self.lambda.unwrap_or(stage.fit.lambda);
         Ok(settings)
     }
 }

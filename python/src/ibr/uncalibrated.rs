@@ -17,7 +17,7 @@ type Tracks = Vec<Vec<Option<Point>>>;
 /// The view from images (H, W, C) and tracks (P, V, 2), NaN where a point is not seen. The virtual camera is
 /// given by the positions (P, 2) of the points in it, or lies between the first two views.
 #[pyfunction]
-#[pyo3(signature = (images, tracks, points, between, size, options, seed, reverse_order))]
+#[pyo3(signature = (images, tracks, points, between, size, options, seed))]
 #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
 pub(crate) fn render_uncalibrated<'py>(
     py: Python<'py>,
@@ -28,25 +28,24 @@ pub(crate) fn render_uncalibrated<'py>(
     size: (usize, usize),
     options: RenderOptions,
     seed: Option<u64>,
-    reverse_order: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let images = images.iter().map(image).collect::<PyResult<Vec<_>>>()?;
     let tracks = positions(&tracks);
     let target = points.map_or(Target::Between(between), |points| Target::Tracks(column(&points)));
     let size = (size.1, size.0);
     let special = UncalibratedSettings::default();
-    let special = UncalibratedSettings { reverse_order, seed: seed.unwrap_or(special.seed) };
+    let special = UncalibratedSettings { seed: seed.unwrap_or(special.seed) };
     let settings = options.settings()?;
     let run = move |_: &_| {
         let images: Vec<&Image> = images.iter().collect();
-        render(&images, &tracks, &target, size, &settings, &special, &|_| ())
+        render(&images, &tracks, &target, size, &settings, &special)
     };
     let done = background::run(py, None, run)?.map_err(refused)?;
     if done.geometry.order_by == OrderBy::Nothing {
         warn(
             py,
             &"the order of depth is undecided: guessed calibrations contradict each other, and colours do not show \
-              it, so no surface hides another. reverse_order=True takes the less likely order, and then they do",
+              it, so no surface hides another",
         )?;
     }
     let geometry = of_report(py, "Geometry", &done.geometry)?;

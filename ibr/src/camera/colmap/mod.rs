@@ -7,7 +7,7 @@ mod points;
 
 pub(crate) use points::{ScenePoint, read_points};
 
-use super::list::{CameraList, Frame, Inner};
+use super::list::{CameraList, Frame, Inner, portable};
 use crate::files::{self, CHECK_THE_PATH, InputError};
 use hybank_core::messages::{Number, Quoted};
 use nalgebra::{Isometry3, Matrix3x4, Quaternion, UnitQuaternion};
@@ -94,7 +94,8 @@ fn join(
         let unlisted =
             || format!("image \"{}\" has camera {camera}, which the cameras do not list", Quoted(&name));
         let inner = *cameras.get(&camera).ok_or_else(|| fault("images", (at, unlisted())))?;
-        frames.insert(name.clone(), Frame { image: name.into(), depth: None, id, pose, inner });
+        let image = portable(&name);
+        frames.insert(name, Frame { image, depth: None, mask: None, id, pose, inner });
     }
     Ok(CameraList::new(path("images"), frames.into_values().collect()))
 }

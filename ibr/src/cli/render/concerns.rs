@@ -62,7 +62,7 @@ impl Concerns {
         }
         if self.undecided > 0 {
             texts.push(
-                "the order of depth is undecided: guessed calibrations contradict each other, and colours do not show it; so no surface hides another. --reverse-order takes the less likely order, and then they do".into(),
+                "the order of depth is undecided: guessed calibrations contradict each other, and colours do not show it; so no surface hides another".into(),
             );
         }
         texts
@@ -96,7 +96,7 @@ mod tests {
         assert_eq!(texts.len(), 3);
         assert!(texts[0].starts_with("3 of 9 virtual views, worst number 7: only 10.0 %"), "{texts:?}");
         assert!(texts[1].starts_with("1 of 9 virtual views, worst number 2: the plane fit"), "{texts:?}");
-        assert!(texts[2].contains("--reverse-order"), "{texts:?}");
+        assert!(texts[2].contains("order of depth"), "{texts:?}");
         assert!(Concerns::default().texts().is_empty());
     }
 }

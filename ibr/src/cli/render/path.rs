@@ -1,10 +1,10 @@
-//! The files of a list of virtual views or of a path: numbered ones, which appear together, or one film.
+//! The files of a list of virtual views or of a path: numbered ones, or one film.
 
 use super::Summary;
 use crate::cli::arguments::RenderArguments;
 use crate::cli::failure::{Failure, failed, usage};
 use crate::cli::output::{self, Outputs, Part};
-use crate::image::{FrameRate, Image, Levels, y4m};
+use crate::image::{Image, Levels, y4m};
 use hybank_core::files::AtomicFile;
 use hybank_program::{is_dash, print_bytes};
 use serde::Serialize;
@@ -69,13 +69,13 @@ pub(super) fn check(arguments: &RenderArguments, frames: usize) -> Result<(), Fa
 /// A film that grows frame by frame: a file that appears when it is whole, or standard output.
 pub(super) struct Film {
     pub(super) file: Option<AtomicFile>,
-    fps: FrameRate,
+    fps: u32,
     begun: bool,
 }
 
 impl Film {
     pub(super) fn new(arguments: &RenderArguments) -> Result<Self, Failure> {
-        let (path, fps) = (&arguments.output, arguments.fps.unwrap_or(FrameRate { frames: 25, seconds: 1 }));
+        let (path, fps) = (&arguments.output, arguments.fps.unwrap_or(25));
         if is_dash(path) {
             return Ok(Self { file: None, fps, begun: false });
         }

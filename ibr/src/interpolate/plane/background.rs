@@ -1,6 +1,6 @@
 //! Classification of holes in the plane, and the surface that is continued into each.
 
-use crate::depth::{NONE, for_holes};
+use crate::depth::{FAR, NONE, for_holes};
 use crate::interpolate::Cover;
 use crate::occlusion::DepthTest;
 
@@ -27,8 +27,18 @@ pub(super) fn sources(depth: &[f32], width: usize, test: &DepthTest) -> Vec<u32>
         let is_side = |k: usize| enclosed(&around[k / 2 * 2..k / 2 * 2 + 2]);
         let sides = (0..4).filter(|k| is_side(*k)).map(|k| (around[k], distances[k]));
         let of = |q: u32| f64::from(depth[q as usize]);
-        let far = sides.clone().map(|(q, _)| of(q)).fold(f64::MIN, f64::max);
-        let farthest = sides.filter(|(q, _)| !test.hides(of(*q), far));
+        let least = sides.clone().map(|(q, _)| of(q)).fold(f64::MAX, f64::min);
+        let most =
+            |limit: f64| sides.clone().map(|(q, _)| of(q)).filter(|d| *d < limit).fold(f64::MIN, f64::max);
+        let away = |depth: f64| {
+            let on_surface = sides.clone().filter(|(q, _)| of(*q) <= depth && !test.hides(of(*q), depth));
+            on_surface.map(|(_, distance)| distance).min().unwrap_or(u32::MAX)
+        };
+        // A sky goes on behind the nearest surface, but seldom behind all that lie between.
+        let (farthest, between) = (most(f64::INFINITY), most(f64::from(FAR)));
+        let is_sky = farthest >= f64::from(FAR) && test.hides(least, between);
+        let far = if is_sky && away(between) <= away(farthest) { between } else { farthest };
+        let farthest = sides.filter(|(q, _)| of(*q) <= far && !test.hides(of(*q), far));
         sources[p] = farthest.min_by_key(|(_, distance)| *distance).map_or(NONE, closest);
     });
     sources
@@ -79,6 +89,23 @@ mod tests {
         assert_eq!(sources(&row, 7, &test)[1..4], [4; 3]);
         let slanted = [4.0, U, U, U, U, 4.02];
         assert_eq!(sources(&slanted, 6, &test)[1..5], [0, 0, 5, 5]);
+    }
+
+    /// A hole beside a pole before ground and sky: the ground below is closer than the sky above.
+    #[test]
+    fn a_sky_does_not_reach_between_surfaces() {
+        let depth = [
+            1.0, FAR, FAR, //
+            1.0, U, 3.0, //
+            1.0, U, 3.0, //
+            1.0, U, 3.0, //
+            1.0, 9.0, 9.0, //
+        ];
+        let sources = sources(&depth, 3, &DepthTest::default());
+        assert_eq!([sources[7], sources[10]], [13, 13]);
+        assert_eq!(sources[4], 1);
+        let alone = super::sources(&[1.0, U, U, U, FAR], 5, &DepthTest::default());
+        assert_eq!(alone[1..4], [4; 3]);
     }
 
     /// A hole that is open to the border continues the closest pixel of its row, whatever lies above.

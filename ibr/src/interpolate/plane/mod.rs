@@ -20,7 +20,7 @@ mod grid;
 mod springs;
 
 use super::extend::{Level, mean};
-use super::{Cover, Degree, HoleFill, Settings, Watch};
+use super::{Cover, Degree, HoleFill, Settings};
 use crate::depth::{DepthMap, Measure, NONE};
 use grid::Grid;
 use hybank_sampling::Fit2;
@@ -140,8 +140,8 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         self.count
     }
 
-    /// Fits the image. `watch` is called with the share of the fit that is done.
-    pub(crate) fn solve(mut self, watch: Watch<'_>) -> PlaneFit {
+    /// Fits the image.
+    pub(crate) fn solve(mut self) -> PlaneFit {
         let (width, height) = (self.width, self.height);
         let mut mask = background::classify(&self.depth, width, &self.settings.depth_test);
         let guessed = mask.iter_mut().zip(std::mem::take(&mut self.distance));
@@ -156,8 +156,7 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         let (counts, mut depth) = (std::mem::take(&mut self.counts), std::mem::take(&mut self.depth));
         let plane = &mut self.settings.plane;
         plane.stiffness = plane.stiffness.max(plane.noise_stiffness);
-        let (mut values, ended) =
-            springs::solve(self.fit, (width, height), &depth, &fitted, &self.settings, watch);
+        let (mut values, ended) = springs::solve(self.fit, (width, height), &depth, &fitted, &self.settings);
         let hybank_sampling::fit2::Convergence { steps, residual, reached } = ended;
         // The depths that were continued into holes are those of the springs only.
         let holes = depth.iter_mut().zip(&mask).filter(|(_, cover)| **cover != Cover::Seen);
@@ -210,7 +209,7 @@ pub(crate) fn fit_surface(values: &[f32], shape: &[f32], width: usize, settings:
         let (x, y) = ((p % width) as f64, (p / width) as f64);
         rows.add(&Fit2Sample { x, y, values: [*value], weight: 1.0 });
     }
-    springs::solve(fit, size, shape, &|_| true, settings, &|_| ()).0
+    springs::solve(fit, size, shape, &|_| true, settings).0
 }
 
 #[cfg(test)]

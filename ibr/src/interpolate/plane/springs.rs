@@ -1,7 +1,7 @@
 //! The stiffness between neighbouring pixels, which falls with the difference of their depths.
 
 use super::grid::Grid;
-use crate::interpolate::{Settings, Watch};
+use crate::interpolate::Settings;
 use crate::occlusion::DepthTest;
 use hybank_sampling::Fit2;
 use hybank_sampling::fit2::{Convergence, Direction, Iteration, Springs};
@@ -14,12 +14,11 @@ pub(super) fn solve<const ORDER: usize, const C: usize>(
     depth: &[f32],
     inside: &(impl Fn(usize) -> bool + Sync),
     settings: &Settings,
-    watch: Watch<'_>,
 ) -> (Vec<f32>, Convergence) {
     let grid = Grid::new(size, &fit);
     let iteration = Iteration { tolerance: settings.plane.tolerance, steps: settings.plane.iterations };
     let springs = |direction, y| of_row(depth, grid, inside, settings, direction, y);
-    fit.connect(springs, |coefficient| !inside(grid.pixel(coefficient))).solve(&iteration, watch)
+    fit.connect(springs, |coefficient| !inside(grid.pixel(coefficient))).solve(&iteration, &|_| ())
 }
 
 /// The springs of one direction that begin in row y of the coefficients, from the depths of the pixels, NaN

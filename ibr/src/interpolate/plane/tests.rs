@@ -30,7 +30,7 @@ fn interpolate(samples: &[Sample<1>], size: (usize, usize), settings: &Settings)
     ) -> PlaneFit {
         let mut problem = PlaneProblem::<ORDER, 1>::new(size, settings);
         problem.add(samples);
-        problem.solve(&|_| ())
+        problem.solve()
     }
     match settings.plane.degree {
         Degree::Linear => of_order::<2>(samples, size, settings),
@@ -148,7 +148,7 @@ fn bands_add_up() {
     let (a, b) = samples.split_at(50);
     problem.add(a);
     problem.add(b);
-    assert_eq!(problem.solve(&|_| ()), whole);
+    assert_eq!(problem.solve(), whole);
 }
 
 /// A hole of 200 x 200 pixels that only the smoothing spans: the diagonal preconditioner needs hundreds of

@@ -1,13 +1,11 @@
 //! A view from images and tracks alone (thesis 2.5).
 
-mod all_views;
-mod base_pair;
 mod colours;
 mod morph;
 mod reconstruction;
 mod surface;
 
-use super::{RenderError, RenderSettings, Rendering, Watch};
+use super::{RenderError, RenderSettings, Rendering};
 use crate::image::Image;
 use crate::interpolate::HoleFill;
 use crate::uncalibrated::Point;
@@ -31,13 +29,11 @@ pub enum Target {
 pub struct UncalibratedSettings {
     /// Seed of the random samples of robust estimators: the same seed gives the same bits.
     pub seed: u64,
-    /// Exchange near and far, whatever decides their order.
-    pub reverse_order: bool,
 }
 
 impl Default for UncalibratedSettings {
     fn default() -> Self {
-        Self { seed: 1, reverse_order: false }
+        Self { seed: 1 }
     }
 }
 
@@ -56,7 +52,7 @@ pub struct GeometryReport {
     pub resection_inliers: usize,
     /// Root mean square reprojection error of the inliers in pixels.
     pub resection_rms: f64,
-    /// Share of the weight of the guessed calibrations that agree on the order of depth; 1 if it was given.
+    /// Share of the weight of the guessed calibrations that agree on the order of depth.
     pub order_agreement: f64,
     /// What decided the order of depth.
     pub order_by: OrderBy,
@@ -67,8 +63,6 @@ pub struct GeometryReport {
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum OrderBy {
-    /// The settings.
-    Given,
     /// Guessed calibrations, which agree.
     Calibrations,
     /// The photographs: where two points of one view fall on one pixel of the other, it shows the nearer.
@@ -91,12 +85,7 @@ pub struct UncalibratedRendering {
     pub geometry: GeometryReport,
 }
 
-/// Renders a view of `size` from images and `tracks[track][image]`.
-///
-/// The scene is reconstructed from two images first: the pair of most matches and parallax, or the first two
-/// if the virtual camera lies between them. The cameras of further images are resected from the tracks, and
-/// then all cameras and points are adjusted together. `watch` is called with the share of the work that is
-/// done.
+/// Renders a view of `size` from two images and `tracks[track][image]`.
 ///
 /// # Errors
 /// [`RenderError`].
@@ -107,44 +96,24 @@ pub fn render(
     size: (usize, usize),
     settings: &RenderSettings,
     uncalibrated: &UncalibratedSettings,
-    watch: Watch<'_>,
 ) -> Result<UncalibratedRendering, RenderError> {
     let columns = tracks.first().map_or(images.len(), Vec::len);
-    if images.len() < 2 || columns != images.len() {
+    if images.len() != 2 || columns != images.len() {
         return Err(RenderError::Tracks { images: images.len(), columns });
     }
     settings.check()?;
-    let numbers = match target {
-        Target::Tracks(_) if images.len() > 2 => base_pair::order(tracks, columns, uncalibrated.seed),
-        _ => (0..columns).collect(),
-    };
-    let images: &[&Image] = &numbers.iter().map(|i| images[*i]).collect::<Vec<_>>();
-    // A row of another length was refused when the tracks were read.
-    let reordered = |t: &Vec<Option<Point>>| numbers.iter().map(|i| t.get(*i).copied().flatten()).collect();
-    let tracks: Vec<Vec<Option<Point>>> = tracks.iter().map(reordered).collect();
-    let mut scene = reconstruction::reconstruct(images, &tracks, target, &numbers, uncalibrated.seed)?;
+    let mut scene = reconstruction::reconstruct(images, tracks, target, uncalibrated.seed)?;
     scene.register(settings.offset);
-    watch(0.4);
     let grey: Vec<Image> = images.par_iter().map(|image| image.to_grey()).collect();
     let of_view = |view: usize| Surface::of(view, images[view].size(), view, &grey, &scene);
     let surfaces: Vec<Surface> = (0..images.len()).into_par_iter().map(of_view).collect();
-    watch(0.5);
     decide(images, &surfaces, &mut scene);
-    if uncalibrated.reverse_order {
-        scene.hand = scene.hand.reversed();
-        (scene.geometry.order_by, scene.geometry.order_agreement) = (OrderBy::Given, 1.0);
-    }
-    watch(0.6);
-    let view_weights = morph::view_weights(&surfaces[0].places);
-    let surface = Surface::of(images.len(), size, view_weights.first_two()[0], &grey, &scene);
+    let surface = Surface::of(images.len(), size, 0, &grey, &scene);
     drop(grey);
-    watch(0.8);
     let render =
         if images.iter().any(|i| i.channels() == 3) { morph::render::<3> } else { morph::render::<1> };
     let leaves = settings.interpolation.fill == HoleFill::Leave;
-    let done = render(images, &surface, &surfaces, &scene, &view_weights, size, leaves)?;
-    watch(1.0);
-    Ok(done)
+    render(images, &surface, &surfaces, &scene, size, leaves)
 }
 
 /// Decides the order of depth from the photographs, which show what is in front, and the guessed

@@ -5,14 +5,13 @@
 //! on its plane and agree on that of a triangle beside it, the pixel lies on that one. A photograph that
 //! shows another surface before the point, by the order of depth, counts less there.
 
-use super::base_pair::{matches, parallax};
 use super::reconstruction::Reconstruction;
 use super::surface::{Surface, colour_at};
 use super::{OrderBy, UncalibratedRendering};
 use crate::depth::{DepthMap, Measure};
 use crate::image::Image;
 use crate::interpolate::{Cover, HoleCount};
-use crate::pipeline::{Agreement, RenderError, Rendering, Report, ViewWeights};
+use crate::pipeline::{Agreement, RenderError, Rendering, Report};
 use crate::sample::Dropped;
 use crate::uncalibrated::Point;
 use crate::uncalibrated::chirality;
@@ -46,11 +45,10 @@ pub(super) fn render<const C: usize>(
     surface: &Surface,
     shown: &[Surface],
     scene: &Reconstruction,
-    view_weights: &ViewWeights,
     size: (usize, usize),
     leaves: bool,
 ) -> Result<UncalibratedRendering, RenderError> {
-    let painter = Painter::new(images, surface, shown, scene, view_weights);
+    let painter = Painter::new(images, surface, shown, scene);
     let (target, pixels) = (images.len(), size.0 * size.1);
     let (mut values, mut mask) = (vec![0.0; pixels * C], vec![Cover::Disocclusion; pixels]);
     let (mut region, mut depth) = (vec![false; pixels], vec![f32::NAN; pixels]);
@@ -108,7 +106,6 @@ struct Plane {
 struct Painter<'a> {
     images: &'a [&'a Image],
     surface: &'a Surface,
-    view_weights: &'a ViewWeights,
     /// The signs of chi by which the nearer one of two points has the smaller one, the virtual view last.
     signs: Vec<f64>,
     /// Of each photograph; empty if the order of depth is undecided.
@@ -116,19 +113,13 @@ struct Painter<'a> {
 }
 
 impl<'a> Painter<'a> {
-    fn new(
-        images: &'a [&'a Image],
-        surface: &'a Surface,
-        shown: &[Surface],
-        scene: &Reconstruction,
-        view_weights: &'a ViewWeights,
-    ) -> Self {
+    fn new(images: &'a [&'a Image], surface: &'a Surface, shown: &[Surface], scene: &Reconstruction) -> Self {
         let signs: Vec<f64> =
             scene.cameras.iter().map(|camera| chirality::order_sign(camera, scene.hand)).collect();
         let hides = scene.geometry.order_by != OrderBy::Nothing;
         let front = |i: usize| Front::of(&shown[i], i, images[i].size(), signs[i]);
         let fronts = if hides { (0..images.len()).into_par_iter().map(front).collect() } else { vec![] };
-        Self { images, surface, view_weights, signs, fronts }
+        Self { images, surface, signs, fronts }
     }
 
     fn places(&self, corner: &[usize; 3]) -> [Point; 3] {
@@ -155,12 +146,12 @@ impl<'a> Painter<'a> {
         (there, self.surface.place_at(image, &plane.corner, there))
     }
 
-    /// The plane on which the two photographs that count most agree.
+    /// The plane on which the two photographs agree.
     fn plane_at<'p, const C: usize>(&self, planes: &'p [Plane], position: &Point) -> &'p Plane {
         let (own, beside) = (&planes[0], &planes[1..]);
         let at = |plane: &Plane, position: &Point| {
             let colour = |i: usize| colour_at::<C>(self.images[i], &self.shown(plane, position, i).1);
-            let [a, b] = self.view_weights.first_two().map(colour);
+            let [a, b] = [0, 1].map(colour);
             Some(a?.iter().zip(b?).map(|(a, b)| (a - b).abs()).sum::<f32>() / C as f32)
         };
         let difference = |plane: &Plane| {
@@ -180,7 +171,7 @@ impl<'a> Painter<'a> {
             let Some(colour) = colour_at(image, &place) else { continue };
             let depth = self.signs[i] * self.surface.chi_at(i, &plane.corner, shares);
             let is_hidden = self.fronts.get(i).is_some_and(|front| front.hides(&place, depth));
-            blend.add(colour, self.view_weights.weight(i as u16), is_hidden);
+            blend.add(colour, is_hidden);
         }
         blend
     }
@@ -200,8 +191,8 @@ struct Blend<const C: usize> {
 }
 
 impl<const C: usize> Blend<C> {
-    fn add(&mut self, colour: [f32; C], weight: f32, is_hidden: bool) {
-        let weight = if is_hidden { HIDDEN_WEIGHT * weight } else { weight };
+    fn add(&mut self, colour: [f32; C], is_hidden: bool) {
+        let weight = if is_hidden { HIDDEN_WEIGHT } else { 1.0 };
         self.sum.iter_mut().zip(colour).for_each(|(sum, value)| *sum += weight * value);
         self.weight += weight;
         self.shown += 1;
@@ -235,20 +226,4 @@ impl Front {
         let pixel = (place.y + 0.5) as usize * self.width + (place.x + 0.5) as usize;
         self.depth.get(pixel).is_some_and(|front| depth > f64::from(*front) + self.apart)
     }
-}
-
-/// Weights of the views: near ones count more, those beyond the two nearest far less, all alike of two. The
-/// distance of a view is the parallax between it and the virtual one, in pixels. `places` are those of the
-/// same points in each photograph and, last, in the virtual view.
-pub(super) fn view_weights(places: &[Vec<Point>]) -> ViewWeights {
-    let Some((there, views)) = places.split_last().filter(|(_, views)| views.len() > 2) else {
-        return ViewWeights::by_distance(&[1.0, 1.0]);
-    };
-    let pairs = |view: &Vec<Point>| -> Vec<Vec<Option<Point>>> {
-        view.iter().zip(there).map(|(p, q)| vec![Some(*p), Some(*q)]).collect()
-    };
-    let distances: Option<Vec<f64>> =
-        views.iter().map(|view| parallax(&matches(&pairs(view), 0, 1))).collect();
-    // Too few points for a distance: all views count alike.
-    ViewWeights::by_distance(&distances.unwrap_or_else(|| vec![1.0; views.len()])).faded()
 }

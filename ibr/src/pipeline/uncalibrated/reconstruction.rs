@@ -1,6 +1,5 @@
 //! Cameras and points of a scene from tracks, in a projective frame.
 
-use super::all_views;
 use super::{GeometryReport, OrderBy, Target};
 use crate::camera::Camera;
 use crate::image::Image;
@@ -30,16 +29,14 @@ pub(super) struct Reconstruction {
     pub(super) seen: Vec<Vec<Option<Point>>>,
     pub(super) hand: Handedness,
     pub(super) geometry: GeometryReport,
-    /// The numbers that the caller gave to the views.
-    pub(super) numbers: Vec<usize>,
 }
 
 impl Reconstruction {
     fn check(&self) -> Result<(), GeometryError> {
         self.cameras.iter().enumerate().try_for_each(|(view, camera)| {
-            let which = match self.numbers.get(view) {
-                Some(number) => format!("the camera of view {}", number + 1),
-                None => "the virtual camera".into(),
+            let which = match view {
+                0 | 1 => format!("the camera of view {}", view + 1),
+                _ => "the virtual camera".into(),
             };
             let checked = Camera::projective(*camera).map(|_| ());
             checked.map_err(|source| GeometryError::Camera { which, source })
@@ -64,34 +61,23 @@ impl Reconstruction {
     }
 }
 
-/// Reconstructs the scene from the first two images and resects all further cameras, the virtual one last.
-/// `numbers` are those that the caller gave to the views.
+/// Reconstructs the scene from two images and resects the virtual camera.
 pub(super) fn reconstruct(
     images: &[&Image],
     tracks: &[Vec<Option<Point>>],
     target: &Target,
-    numbers: &[usize],
     seed: u64,
 ) -> Result<Reconstruction, RenderError> {
     let base = Base::new(images, tracks, seed)?;
     let in_target = base.points_in(target)?;
-    let mut seen = with_target(base.tracks.iter().map(|j| &tracks[*j]), &in_target);
-    let resections: Vec<Resection> = (2..=images.len())
-        .map(|column| resected(&base.points, &seen, column, seed))
-        .collect::<Result<_, _>>()?;
+    let seen = with_target(base.tracks.iter().map(|j| &tracks[*j]), &in_target);
+    let found = resected(&base.points, &seen, images.len(), seed)?;
     let mut cameras = base.cameras.to_vec();
-    cameras.extend(resections.iter().map(|resection| resection.camera));
-    let found = resections.last().ok_or(GeometryError::Numerical { what: "virtual camera" })?;
+    cameras.push(found.camera);
     let mut points = base.points.clone();
     chirality::orient(&mut cameras, &mut points, |i, j| seen[j][i].is_some());
     let order = Order::of(&base.f.matrix, &some(&base.matches), &some(&points), &cameras[0], base.sizes)
         .ok_or(GeometryError::Numerical { what: "order of depth" })?;
-    if let (Target::Tracks(positions), 3..) = (target, images.len()) {
-        let all = with_target(tracks.iter(), positions);
-        let cloud = all_views::adjust(&mut cameras, &all, REPROJECTION);
-        (points, seen) = (cloud.points, cloud.seen);
-        chirality::orient(&mut cameras, &mut points, |i, j| seen[j][i].is_some());
-    }
     let geometry = GeometryReport {
         matches: base.given,
         inliers: base.f.inliers.len(),
@@ -103,8 +89,7 @@ pub(super) fn reconstruct(
         // Until the photographs have been asked.
         order_by: OrderBy::Nothing,
     };
-    let numbers = numbers.to_vec();
-    let scene = Reconstruction { cameras, points, seen, hand: order.hand, geometry, numbers };
+    let scene = Reconstruction { cameras, points, seen, hand: order.hand, geometry };
     scene.check()?;
     Ok(scene)
 }

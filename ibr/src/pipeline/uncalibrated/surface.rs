@@ -106,7 +106,7 @@ fn points(view: usize, size: (usize, usize), scene: &Reconstruction) -> Vec<usiz
 
 /// The colour of an image between its pixels; `None` outside.
 pub(super) fn colour_at<const C: usize>(image: &Image, p: &Point) -> Option<[f32; C]> {
-    let value = |c: usize| image.value_at(p.x, p.y, c.min(image.channels() - 1));
+    let value = |c: usize| image.cubic_at(p.x, p.y, c.min(image.channels() - 1));
     let colour = std::array::from_fn(value);
     colour.iter().all(|value| !value.is_nan()).then_some(colour)
 }

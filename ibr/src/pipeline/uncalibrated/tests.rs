@@ -66,7 +66,7 @@ fn outcome(kind: Kind, seed: u64) -> Option<(OrderBy, bool)> {
     }
     let images = [&shots[0].0, &shots[1].0];
     let target = Target::Tracks(tracks.iter().map(|t| t[1]).collect());
-    let mut found = reconstruction::reconstruct(&images, &tracks, &target, &[0, 1], 1).ok()?;
+    let mut found = reconstruction::reconstruct(&images, &tracks, &target, 1).ok()?;
     let grey = images.map(|image| image.to_grey());
     let surfaces = [0, 1].map(|view| Surface::of(view, SIZE, view, &grey, &found));
     let (by_calibrations, advantage) = (found.hand, Advantage::of(&images, &surfaces, &found));

@@ -4,18 +4,25 @@ use super::row_map::RowMap;
 use super::{CalibratedView, Frame, Tile};
 use crate::camera::Relative;
 use crate::depth::{Origin, Reliefs, TILE, or_far};
-use crate::occlusion::{Points, RUN};
+use crate::occlusion::{DepthTest, Points, RUN};
 use crate::propagate::{DOUBTFUL_WEIGHT, GUESSED_WEIGHT, spacing, weight};
 use crate::sample::Sample;
 
 /// The pixels of some tiles at their places in the virtual image, view by view and row by row.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Projected {
+pub struct Projected {
     points: Points,
     weights: Vec<f32>,
     doubtful: Vec<bool>,
+    origins: Vec<Origin>,
+    /// Shares of the views in the places of the pixels.
+    shares: Vec<f32>,
     tiles: Vec<ProjectedTile>,
 }
+
+/// Share of a view below which its samples hide nothing: outlines that oblique views show tear holes into
+/// what near ones show.
+const LEAST_SHARE: f32 = 0.02;
 
 #[derive(Debug, Clone, Copy)]
 struct ProjectedTile {
@@ -33,6 +40,7 @@ impl Projected {
         tile: &Tile,
         frame: &Frame,
         own: (f64, f64),
+        test: &DepthTest,
     ) {
         let (row, column) = (tile.row as usize, tile.column as usize);
         let first_pixel = row * view.image.width() + column;
@@ -41,7 +49,7 @@ impl Projected {
         let mut depths = [f32::NAN; TILE];
         depths[..known.len()].copy_from_slice(known);
         let count = known.len().next_multiple_of(RUN);
-        let reliefs = view.map.reliefs(column, row);
+        let reliefs = view.map.reliefs(column, row, test);
         let mut places = Places::new(&RowMap::new(map, row), column, &depths, &reliefs, count);
         places.keep(frame, own, count);
         let (mut doubtful, mut origins) = (reliefs.behind_edge, [Origin::Known; TILE]);
@@ -65,7 +73,9 @@ impl Projected {
         points.spacing.extend_from_slice(&spacings[..count]);
         self.weights.extend_from_slice(&weights[..count]);
         self.doubtful.extend_from_slice(&doubtful[..count]);
-        points.origin.extend_from_slice(&origins[..count]);
+        points.hides.extend(origins[..count].iter().map(|origin| *origin != Origin::Filled));
+        self.origins.extend_from_slice(&origins[..count]);
+        self.shares.resize(points.len(), 1.0);
     }
 
     pub(crate) fn points(&self) -> &Points {
@@ -80,8 +90,25 @@ impl Projected {
         places.iter().for_each(|i| self.points.own[*i as usize] = false);
     }
 
+    /// Gives each pixel the share of its view in its place; what has hardly any hides nothing.
+    pub(crate) fn share(&mut self, mut share: impl FnMut(u16, [f64; 2], f32) -> f32) {
+        let Self { points, tiles, shares, .. } = self;
+        let ends = tiles.iter().skip(1).map(|next| next.first_place).chain([points.len()]);
+        for (tile, end) in tiles.iter().zip(ends) {
+            for i in (tile.first_place..end).filter(|i| !points.x[*i].is_nan()) {
+                shares[i] = share(tile.view, [points.x[i], points.y[i]], points.depth[i]);
+                points.hides[i] &= shares[i] > LEAST_SHARE;
+            }
+        }
+    }
+
+    /// The shares of the [`samples`](Self::samples).
+    pub(crate) fn shares(&self) -> Vec<f32> {
+        self.shares.iter().zip(&self.points.own).filter(|(_, own)| **own).map(|(share, _)| *share).collect()
+    }
+
     pub(crate) fn samples<const C: usize>(&self, views: &[CalibratedView<'_>]) -> Vec<Sample<C>> {
-        let Self { points, weights, doubtful, tiles } = self;
+        let Self { points, weights, doubtful, tiles, origins, .. } = self;
         let mut samples = Vec::with_capacity(self.count());
         let ends = tiles.iter().skip(1).map(|next| next.first_place).chain([points.len()]);
         for (tile, end) in tiles.iter().zip(ends) {
@@ -98,7 +125,7 @@ impl Projected {
                     pixel,
                     view: tile.view,
                     doubtful: doubtful[i],
-                    origin: points.origin[i],
+                    origin: origins[i],
                 }
             };
             samples.extend((tile.first_place..end).filter(|i| points.own[*i]).map(sample));

@@ -41,7 +41,14 @@ impl Footprint {
         let (mut projected, band) = (Projected::default(), self.frame.band(top, bottom));
         for tile in self.reaching(band.rows, |_| 0.0) {
             let view = usize::from(tile.view);
-            projected.push(&views[view], &self.maps[view], tile, &band, (f64::MIN, f64::MAX));
+            projected.push(
+                &views[view],
+                &self.maps[view],
+                tile,
+                &band,
+                (f64::MIN, f64::MAX),
+                &DepthTest::default(),
+            );
         }
         projected.samples(views)
     }
@@ -93,7 +100,14 @@ fn the_spacing_of_a_tile_is_bounded() {
     for tile in &footprint.tiles {
         let mut projected = Projected::default();
         let view = usize::from(tile.view);
-        projected.push(&views[view], &footprint.maps[view], tile, &frame, (f64::MIN, f64::MAX));
+        projected.push(
+            &views[view],
+            &footprint.maps[view],
+            tile,
+            &frame,
+            (f64::MIN, f64::MAX),
+            &DepthTest::default(),
+        );
         for s in projected.samples::<1>(&views) {
             assert!(s.spacing <= tile.spacing, "{s:?} in {tile:?}");
             near += usize::from(tile.spacing < 2.0 * s.spacing);

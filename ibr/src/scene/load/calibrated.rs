@@ -1,15 +1,22 @@
 //! Scenes of general cameras: 3 x 4 matrices, COLMAP models or transforms files, and depths.
 
 use super::left_out::LeftOut;
+use super::maps::on_its_side;
 use super::{Goal, Inputs, Loaded, Loader, each};
 use crate::camera::Camera;
 use crate::camera::ListedCamera;
 use crate::camera::resize::{Size, factors};
-use crate::depth::Measure;
+use crate::depth::{DepthMap, Measure};
 use crate::files::InputError;
+use crate::image::{image_size, read_map};
+use crate::pipeline::calibrated::QUARTILES;
+use crate::pipeline::nearness::{AT_HAND, Placed, choose};
+use crate::scene::spec::MapSource;
 use crate::scene::{Kind, ViewSpec};
 use hybank_core::messages::Quoted;
-use nalgebra::Matrix3x4;
+use nalgebra::{Matrix3, Matrix3x4, Vector3};
+use std::collections::BTreeSet;
+use std::sync::PoisonError;
 
 type Matrix = [[f64; 4]; 3];
 
@@ -56,22 +63,83 @@ impl Loader<'_> {
     ) -> Loaded<Inputs> {
         self.a_camera_each()?;
         self.keys_of(views, goals, "calibrated")?;
-        let one = |view: &&ViewSpec| {
-            let camera = |size| Ok(self.camera_of(view, size)?.0);
-            self.read(view, Measure::Depth, camera, |image, camera| self.of_points(view, image, camera))
+        let place = |view: &&ViewSpec| {
+            let size = image_size(&self.file(&view.image))?;
+            let (camera, resized) = self.camera_of(view, size)?;
+            Ok((Placed { camera, size }, resized))
         };
-        let read = each(views, one, self.watch)?;
-        let resized =
-            views.iter().zip(&read).map(|(view, read)| Ok(self.camera_of(view, read.image.size())?.1));
-        let resized = resized.collect::<Loaded<Vec<_>>>()?;
-        let first = First { size: read[0].image.size(), resized: resized[0] };
+        let (placed, resized): (Vec<Placed>, Vec<_>) = each(views, place)?.into_iter().unzip();
+        let first = First { size: placed[0].size, resized: resized[0] };
         let (cameras, size) = match left_out {
             Some(place) => self.at_place(place, first, goals)?,
             None => self.cameras(goals, first)?,
         };
-        let notes = notes(resized.into_iter().flatten());
-        let views = self.matched(views, read, Measure::Depth)?;
-        Ok(Inputs { kind: Kind::Calibrated { views, cameras, size }, calibration: None, notes })
+        let numbers = self.needed(views, &placed, &cameras, size)?;
+        let notes = notes(numbers.iter().filter_map(|number| resized[*number]));
+        let views: Vec<&ViewSpec> = numbers.iter().map(|number| views[*number]).collect();
+        let chosen: Vec<(&ViewSpec, Camera)> =
+            numbers.iter().zip(&views).map(|(number, view)| (*view, placed[*number].camera)).collect();
+        let one = |(view, camera): &(&ViewSpec, Camera)| {
+            self.read(
+                view,
+                Measure::Depth,
+                |_| Ok(*camera),
+                |source, image, camera| match source {
+                    MapSource::Mesh(file) => self.of_mesh(view, file, image, camera),
+                    _ => self.of_points(view, image, camera),
+                },
+            )
+        };
+        let (views, hidden) = self.whole(&views, each(&chosen, one)?, Measure::Depth)?;
+        Ok(Inputs { kind: Kind::Calibrated { views, cameras, size }, numbers, hidden, notes })
+    }
+
+    /// The numbers of the views that the virtual cameras need.
+    fn needed(
+        &self,
+        views: &[&ViewSpec],
+        placed: &[Placed],
+        cameras: &[Camera],
+        size: Size,
+    ) -> Loaded<Vec<usize>> {
+        // With one more the weights of the others are known.
+        let most = self.options.nearest.map(|nearest| nearest.saturating_add(1));
+        if placed.len() <= most.unwrap_or(AT_HAND) {
+            return Ok((0..placed.len()).collect());
+        }
+        let mut needed = BTreeSet::new();
+        for camera in cameras {
+            let depths = self.depths_before(views, placed, camera)?;
+            needed.extend(choose(placed, &Placed { camera: *camera, size }, &depths, most));
+        }
+        Ok(needed.into_iter().collect())
+    }
+
+    /// Depths of the scene before a camera, about: those of the map of the nearest view that has one, or the
+    /// distance of the point at which the cameras look.
+    fn depths_before(&self, views: &[&ViewSpec], placed: &[Placed], camera: &Camera) -> Loaded<Vec<f64>> {
+        let stored = (0..views.len()).filter(|view| views[*view].is_stored() && views[*view].depth.is_some());
+        let apart = |view: usize| {
+            let other = &placed[view].camera;
+            (other.centre() - camera.centre()).norm() * (2.0 - other.axis().dot(&camera.axis()))
+        };
+        let nearest = stored.min_by(|a, b| apart(*a).total_cmp(&apart(*b)));
+        let Some((view, file)) = nearest.and_then(|view| Some((views[view], views[view].depth.as_ref()?)))
+        else {
+            return Ok(vec![looked_at(placed, camera)]);
+        };
+        let (path, scale) = (self.file(file), view.depth_scale.unwrap_or(1.0));
+        let mut known = self.quartiles.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(depths) = known.get(&path) {
+            return Ok(depths.clone());
+        }
+        let (width, height, values) = read_map(&path, self.options.max_pixels)?;
+        let map = DepthMap::new((width, height), values, scale, Measure::Depth)
+            .map_err(|e| InputError::file(&path, format!("{}: {e}", view.named())))?;
+        let depths: Vec<f64> =
+            QUARTILES.iter().filter_map(|share| map.quantile(*share)).map(f64::from).collect();
+        known.insert(path, depths.clone());
+        Ok(depths)
     }
 
     /// The camera of the view that is left out, or of an image that the file of cameras lists, and the size
@@ -97,7 +165,9 @@ impl Loader<'_> {
     /// The virtual cameras and their size.
     fn cameras(&self, goals: &[Goal], first: First) -> Loaded<(Vec<Camera>, Size)> {
         let (_, listed) = self.start_of(&goals[0], first)?;
-        let size = self.size(goals, listed.map_or(first.size, |size| first.alike(size)))?;
+        let is_alike = goals[0].target.cameras.is_none();
+        let own = listed.map_or(first.size, |size| if is_alike { first.alike(size) } else { size });
+        let size = self.size(goals, own)?;
         let cameras = self.along(
             goals,
             |goal| self.scaled(self.start_of(goal, first)?, size, &goal.name),
@@ -147,12 +217,13 @@ impl Loader<'_> {
         let ListedCamera { camera, size: from } = self.listed_camera(&source, &image, size, &which)?;
         if factors(from, size).is_none() {
             return Err(self.incomplete(format!(
-                "{which}: the image has {} x {} pixels, but {} lists its camera for {} x {}; use the image that was calibrated, or one that was resized by the same factor in both directions",
+                "{which}: the image has {} x {} pixels, but {} lists its camera for {} x {}; use the image that was calibrated, or one that was resized by the same factor in both directions{}",
                 size.0,
                 size.1,
                 Quoted(&source.path),
                 from.0,
-                from.1
+                from.1,
+                on_its_side(size, from)
             )));
         }
         let resized = (from != size).then_some(Resized { from, to: size });
@@ -172,13 +243,13 @@ impl Loader<'_> {
         if let Some(rows) = rows {
             return Ok((self.matrix(rows, &goal.name)?, None));
         }
-        match (image, self.common_source()) {
+        match (image, self.source_of_goal(goal)) {
             (Some(image), Some(source)) => {
                 let found = self.listed_camera(&source, image, first.size, &goal.name)?;
                 Ok((found.camera, Some(found.size)))
             }
             (Some(_), None) => Err(self.incomplete(format!(
-                "{} has `camera_of`, which needs a `colmap` folder or a `transforms` file at the top; give it a `camera` (3 x 4), or name that file",
+                "{} has `camera_of`, which needs `cameras`, or a `colmap` folder or a `transforms` file at the top; give it a `camera` (3 x 4), or name that file",
                 goal.name
             ))),
             (None, Some(source)) => Err(self.incomplete(format!(
@@ -189,6 +260,21 @@ impl Loader<'_> {
             (None, None) => Err(self.incomplete(format!("{} needs a `camera` (3 x 4)", goal.name))),
         }
     }
+}
+
+/// The distance of the point that is nearest to the axes of all cameras, along that of one; that of the
+/// camera farthest away from it where the axes do not meet before it.
+fn looked_at(placed: &[Placed], camera: &Camera) -> f64 {
+    let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for Placed { camera, .. } in placed {
+        let across = Matrix3::identity() - camera.axis() * camera.axis().transpose();
+        matrix += across;
+        right += across * camera.centre();
+    }
+    let met = matrix.try_inverse().map(|inverse| (inverse * right - camera.centre()).dot(&camera.axis()));
+    let widest =
+        placed.iter().map(|other| (other.camera.centre() - camera.centre()).norm()).fold(0.0, f64::max);
+    met.filter(|depth| *depth > 0.0).unwrap_or(widest)
 }
 
 /// What to say of cameras that were resized, each change once.

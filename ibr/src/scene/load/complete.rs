@@ -1,16 +1,13 @@
 //! Scenes whose views are listed in files of other programs.
 
 use super::Loaded;
-use crate::camera::Frame;
-use crate::camera::middlebury::read_calibration;
 use crate::camera::transforms::read_transforms;
-use crate::files::InputError;
-use crate::scene::{SceneSpec, ViewSpec};
-use hybank_core::messages::{Number, Quoted};
+use crate::camera::{CameraList, Frame};
+use crate::scene::{SceneSpec, TargetSpec, ViewSpec};
 use std::path::Path;
 
-/// The scene with what its `transforms` or `calib` file adds: views if it lists none, and disparity offsets.
-/// `path` is the scene file.
+/// The scene with what other files add: the views of its `transforms` file if it lists none, and a virtual
+/// view for each of the `cameras` of a list. `path` is the scene file.
 ///
 /// # Errors
 /// `InputError` of the file.
@@ -18,26 +15,14 @@ pub fn complete(spec: &SceneSpec, path: &Path) -> Loaded<SceneSpec> {
     let mut whole = spec.clone();
     let folder = path.parent().unwrap_or(Path::new(""));
     if let (Some(file), true) = (&spec.transforms, spec.view.is_empty()) {
-        whole.view = transforms_views(file, folder, spec.depth_scale)?;
+        whole.view = transforms_views(file, folder, spec)?;
     }
-    if let Some(file) = &spec.calib {
-        if spec.view.is_empty() {
-            (whole.view, whole.notes) = pair_views(file, folder);
-        }
-        let calibration = read_calibration(&folder.join(file))?;
-        for view in &mut whole.view {
-            let offset = *view.disparity_offset.get_or_insert(calibration.offset);
-            if offset != calibration.offset {
-                let reason = format!(
-                    "{} has disparity_offset = {}, but {} says {}; remove one of them",
-                    view.named(),
-                    Number(offset),
-                    Quoted(file),
-                    Number(calibration.offset)
-                );
-                return Err(InputError::file(path, reason));
-            }
-        }
+    whole.targets.clear();
+    for target in &spec.targets {
+        whole.targets.extend(of_all_cameras(target, folder)?);
+    }
+    for view in whole.view.iter_mut().filter(|view| view.position.is_none()) {
+        view.depth = view.depth.take().or_else(|| spec.depth.clone());
     }
     for view in whole.view.iter_mut().filter(|view| view.is_stored()) {
         view.disparity_scale = view.disparity_scale.or(spec.disparity_scale);
@@ -46,17 +31,32 @@ pub fn complete(spec: &SceneSpec, path: &Path) -> Loaded<SceneSpec> {
     Ok(whole)
 }
 
-/// The frames with depth; paths in the file are relative to it.
-fn transforms_views(file: &Path, folder: &Path, scale: Option<f64>) -> Loaded<Vec<ViewSpec>> {
+/// The virtual view of a table, or one for each camera of its list.
+fn of_all_cameras(target: &TargetSpec, folder: &Path) -> Loaded<Vec<TargetSpec>> {
+    let Some(file) = target.cameras.as_ref().filter(|_| target.camera_of.is_none()) else {
+        return Ok(vec![target.clone()]);
+    };
+    let list = CameraList::read(&folder.join(file))?;
+    let of =
+        |frame: &Frame| TargetSpec { camera_of: Some(frame.image.display().to_string()), ..target.clone() };
+    Ok(list.frames.iter().map(of).collect())
+}
+
+/// The frames of a file whose depth is known: all, if the scene says where depth comes from; else those with
+/// a map. Paths in the file are relative to it.
+fn transforms_views(file: &Path, folder: &Path, spec: &SceneSpec) -> Loaded<Vec<ViewSpec>> {
     let all = read_transforms(&folder.join(file))?;
     let beside = file.parent().unwrap_or(Path::new(""));
     let view = |frame: &Frame| {
-        let depth = frame.depth.as_ref()?;
+        if frame.depth.is_none() && spec.depth.is_none() {
+            return None;
+        }
         Some(ViewSpec {
             name: Some(frame.image.display().to_string()),
             image: beside.join(&frame.image),
-            depth: Some(beside.join(depth)),
-            depth_scale: scale.or(ViewSpec::usual_scale(depth)),
+            depth: frame.depth.as_ref().map(|depth| beside.join(depth)),
+            depth_scale: frame.depth.as_ref().and_then(|d| spec.depth_scale.or(ViewSpec::usual_scale(d))),
+            mask: frame.mask.as_ref().map(|mask| beside.join(mask)),
             ..ViewSpec::default()
         })
     };
@@ -64,31 +64,5 @@ fn transforms_views(file: &Path, folder: &Path, scale: Option<f64>) -> Loaded<Ve
     match all.frames.first() {
         Some(frame) if views.is_empty() => Err(all.without_depth(frame)),
         _ => Ok(views),
-    }
-}
-
-/// The views of a pair whose disparity maps are there, and what is to be said of a missing one.
-fn pair_views(file: &Path, folder: &Path) -> (Vec<ViewSpec>, Vec<String>) {
-    let beside = file.parent().unwrap_or(Path::new(""));
-    let view = |k: usize| ViewSpec {
-        image: beside.join(format!("im{k}.png")),
-        position: Some(k as f64),
-        disparity: Some(beside.join(format!("disp{k}.pfm"))),
-        ..ViewSpec::default()
-    };
-    let has_map = |k: &usize| folder.join(beside).join(format!("disp{k}.pfm")).exists();
-    let found: Vec<usize> = (0..2).filter(has_map).collect();
-    match found[..] {
-        // The message about the file that cannot be opened names the first map.
-        [] => (vec![view(0)], Vec::new()),
-        [only] => {
-            let note = format!(
-                "there is no disp{}.pfm beside {}: the view is rendered from im{only}.png alone",
-                1 - only,
-                Quoted(file)
-            );
-            (vec![view(only)], vec![note])
-        }
-        _ => ((0..2).map(view).collect(), Vec::new()),
     }
 }

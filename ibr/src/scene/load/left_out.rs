@@ -17,17 +17,16 @@ pub(super) enum LeftOut {
 impl Loader<'_> {
     /// The view that is left out: the one of this name, or the one whose name or image ends like it; else an
     /// image that the file of cameras lists.
-    pub(super) fn left_out(&self) -> Loaded<Option<LeftOut>> {
-        let Some(name) = &self.options.view else { return Ok(None) };
+    pub(super) fn left_out(&self, name: &str) -> Loaded<LeftOut> {
         let views = &self.spec.view;
-        if let Some(index) = views.iter().position(|view| view.label() == *name) {
-            return Ok(Some(LeftOut::View(index)));
+        if let Some(index) = views.iter().position(|view| view.label() == name) {
+            return Ok(LeftOut::View(index));
         }
         let labels: Vec<String> = views.iter().map(ViewSpec::label).collect();
         let images: Vec<String> = views.iter().map(|view| view.image.display().to_string()).collect();
         for list in [labels, images] {
             match names::find(&list, name) {
-                Ok(found) if found.whole => return Ok(Some(LeftOut::View(found.index))),
+                Ok(found) if found.whole => return Ok(LeftOut::View(found.index)),
                 Err(e @ NameError::Ambiguous { .. }) => return Err(self.incomplete(format!("--view: {e}"))),
                 _ => (),
             }
@@ -35,7 +34,7 @@ impl Loader<'_> {
         let source = self.common_source().filter(|_| views.iter().all(|view| view.position.is_none()));
         let listed = source.map(|source| self.listed_name(&source, name)).transpose()?.flatten();
         match listed.is_some_and(|(_, whole)| whole) {
-            true => Ok(Some(LeftOut::Listed(name.clone()))),
+            true => Ok(LeftOut::Listed(name.into())),
             false => Err(self.no_such_view(name)),
         }
     }

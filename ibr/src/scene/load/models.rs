@@ -1,11 +1,12 @@
 //! Cameras from files of other programs, each file read once.
 
-use super::{Loaded, Loader};
+use super::{Goal, Loaded, Loader};
 use crate::camera::colmap::{ScenePoint, read_model, read_points};
 use crate::camera::names::{self, NameError};
 use crate::camera::resize::Size;
 use crate::camera::transforms::read_transforms;
 use crate::camera::{CameraList, ListedCamera};
+use crate::depth::Mesh;
 use crate::files::InputError;
 use crate::scene::ViewSpec;
 use hybank_core::messages::Quoted;
@@ -25,11 +26,16 @@ pub(super) struct Source {
 pub(super) struct Models {
     read: Mutex<BTreeMap<PathBuf, Arc<CameraList>>>,
     points: Mutex<BTreeMap<PathBuf, Arc<Vec<ScenePoint>>>>,
+    meshes: Mutex<BTreeMap<PathBuf, Arc<Mesh>>>,
 }
 
 impl Models {
     fn get(&self, source: &Source) -> Loaded<Arc<CameraList>> {
         once(&self.read, &source.path, source.read)
+    }
+
+    pub(super) fn mesh(&self, path: &Path) -> Loaded<Arc<Mesh>> {
+        once(&self.meshes, path, Mesh::read)
     }
 
     /// The points of the COLMAP model in a folder that one of its images shows.
@@ -69,6 +75,13 @@ impl Loader<'_> {
         let source = |path: &PathBuf, read| Source { path: self.file(path), read };
         let colmap = self.spec.colmap.as_ref().map(|folder| source(folder, read_model));
         colmap.or_else(|| self.spec.transforms.as_ref().map(|file| source(file, read_transforms)))
+    }
+
+    /// The file that lists the camera of a virtual view.
+    pub(super) fn source_of_goal(&self, goal: &Goal) -> Option<Source> {
+        let own = goal.target.cameras.as_ref();
+        own.map(|file| Source { path: self.file(file), read: CameraList::read })
+            .or_else(|| self.common_source())
     }
 
     /// The camera of an image, as the file lists it. `fallback` is the size of the image if the file does

@@ -1,10 +1,10 @@
 //! Scenes of a rectified rig: positions and disparities.
 
 use super::{Goal, Inputs, Loaded, Loader, each};
-use crate::camera::middlebury::{Calibration, read_calibration};
 use crate::depth::Measure;
 use crate::scene::{Kind, SourceView, ViewSpec};
 use hybank_core::messages::Quoted;
+use std::path::Path;
 
 impl Loader<'_> {
     pub(super) fn rectified(
@@ -22,24 +22,26 @@ impl Loader<'_> {
             let position = self.need(view.position, view, "position", "rectified")?;
             let position = self.finite(position, &view.named())?;
             let no_points = || {
+                let map = view.disparity.as_deref().unwrap_or(Path::new(""));
                 self.incomplete(format!(
-                    "{} has disparity = \"points\", which a rectified rig does not have; give it a map or \"matched\"",
-                    view.named()
+                    "{} has disparity = \"{}\", points of a world, which a rectified rig does not have; give it a map or \"matched\"",
+                    view.named(),
+                    Quoted(map)
                 ))
             };
-            self.read(view, Measure::Disparity, |_| Ok(position), |_, _| Err(no_points()))
+            self.read(view, Measure::Disparity, |_| Ok(position), |_, _, _| Err(no_points()))
         };
-        let sources = each(views, one, self.watch)?;
+        let sources = each(views, one)?;
         let first = sources[0].image.size();
         for (view, source) in views.iter().zip(&sources) {
             source.image.same_size(&view.named(), first, &views[0].named())?;
         }
         self.no_other_size(goals, first)?;
-        let calibration = self.calibration(first)?;
         let is_matched = views.iter().any(|view| !view.is_stored());
-        let views = self.matched(views, sources, Measure::Disparity)?;
+        let (views, hidden) = self.whole(views, sources, Measure::Disparity)?;
         let notes = note_of_exchange(&views).filter(|_| is_matched).into_iter().collect();
-        Ok(Inputs { kind: Kind::Rectified { views, positions }, calibration, notes })
+        let numbers = (0..views.len()).collect();
+        Ok(Inputs { kind: Kind::Rectified { views, positions }, numbers, hidden, notes })
     }
 
     /// A rectified virtual view is as large as the views.
@@ -73,22 +75,6 @@ impl Loader<'_> {
             })?;
             Ok(from + (self.finite(end, "the end of the path")? - from) * share)
         })
-    }
-
-    /// The calibration file, refused for images of another size: its offset is in their pixels.
-    fn calibration(&self, size: (usize, usize)) -> Loaded<Option<Calibration>> {
-        let Some(file) = &self.spec.calib else { return Ok(None) };
-        let calibration = read_calibration(&self.file(file))?;
-        let (width, height) = calibration.size;
-        if (width, height) == size {
-            return Ok(Some(calibration));
-        }
-        Err(self.incomplete(format!(
-            "{} is for images of {width} x {height} pixels, but the views have {} x {}; use the calibration of that size, or give `disparity_offset` (in pixels of these images) in the views instead of `calib`",
-            Quoted(file),
-            size.0,
-            size.1
-        )))
     }
 }
 

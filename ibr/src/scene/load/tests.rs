@@ -11,6 +11,7 @@ fn scene(text: &str) -> (tempfile::TempDir, PathBuf) {
     write("a.pgm", b"P5 4 2 255\n\x01\x02\x03\x04\x05\x06\x07\x08");
     write("small.pgm", b"P5 2 1 255\n\x01\x02");
     write("d.pgm", b"P5 4 2 255\n\x04\x04\x04\x00\x04\x04\x04\x04");
+    write("tall.pgm", b"P5 2 4 255\n\x04\x04\x04\x04\x04\x04\x04\x04");
     write("zero.pgm", b"P5 4 2 255\n\0\0\0\0\0\0\0\0");
     write("t.txt", b"1 2 3 4 5 6\n1 2 - 5 6\n");
     let path = dir.path().join("scene.toml");
@@ -21,7 +22,7 @@ fn scene(text: &str) -> (tempfile::TempDir, PathBuf) {
 fn read(text: &str, options: &LoadOptions) -> Result<Scene, String> {
     let (_dir, path) = scene(text);
     let spec = parse(text, &path).map_err(|e| e.to_string())?;
-    load(&spec, &path, options, &|_| ()).map_err(|e| e.to_string())
+    load(&spec, &path, options).map_err(|e| e.to_string())
 }
 
 const RIG: &str = r#"
@@ -46,7 +47,11 @@ fn a_rectified_rig_is_read() {
     let Kind::Rectified { views, positions } = read_rig.kind else { panic!("{read_rig:?}") };
     assert_eq!((views.len(), &positions[..], read_rig.filled), (2, &[0.5][..], 2));
     assert_eq!((views[0].map.data()[3], views[1].map.data()[3]), (1.0, 4.0));
-    let without = LoadOptions { view: Some("right".into()), fill: false, ..LoadOptions::default() };
+    let without = LoadOptions {
+        view: Some("right".into()),
+        unknown: Some(crate::scene::Unknown::Drop),
+        ..LoadOptions::default()
+    };
     let Kind::Rectified { views, positions } = read(RIG, &without).unwrap().kind else { panic!() };
     assert_eq!((views.len(), &positions[..]), (1, &[1.0][..]));
     assert!(views[0].map.data()[3].is_nan());
@@ -190,9 +195,10 @@ fn what_is_wrong_is_named() {
         assert!(words.iter().all(|w| message.contains(w)), "{message}");
     };
     fails(&RIG.replace("disparity_scale", "disparity_scal"), &["scene.toml:7:5", "disparity_scal"]);
-    fails(&RIG.replacen("disparity = \"d.pgm\"", "", 1), &["\"left\"", "`disparity`"]);
+    fails(&RIG.replace("disparity = \"d.pgm\"", ""), &["\"left\"", "`disparity`"]);
     fails(&RIG.replacen("a.pgm", "missing.pgm", 1), &["missing.pgm"]);
     fails(&RIG.replacen("\"a.pgm\"", "\"small.pgm\"", 1), &["d.pgm", "4 x 2", "2 x 1"]);
+    fails(&RIG.replacen("d.pgm", "tall.pgm", 1), &["tall.pgm", "2 x 4", "on its side"]);
     fails(&RIG.replace("d.pgm", "zero.pgm"), &["zero.pgm", "none of the 8 values"]);
     fails(&RIG.replace("4.0", "0.0"), &["the scale is 0"]);
     fails(&RIG.replace("[virtual]\n    position = 0.5", ""), &["[virtual] needs a `position`"]);
@@ -221,6 +227,8 @@ fn what_is_wrong_is_named() {
 /// 12 bits in files of 16 are at most 4095 / 257, and dark photographs of 8 bits are no such data.
 #[test]
 fn data_of_twelve_bits_are_noticed() {
-    let noted = |values: [f32; 2]| note_of_dark(&[&Image::new(2, 1, 1, values.to_vec()).unwrap()]).is_some();
+    let noted = |values: [f32; 2]| {
+        crate::scene::notes::of_dark(&[&Image::new(2, 1, 1, values.to_vec()).unwrap()]).is_some()
+    };
     assert!(noted([15.9, 3.1]) && !noted([15.0, 3.0]) && !noted([16.1, 3.1]));
 }

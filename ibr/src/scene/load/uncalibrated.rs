@@ -23,7 +23,7 @@ impl Loader<'_> {
             None => goals.iter().filter_map(|goal| goal.target.from_tracks).collect(),
         };
         let columns = self.columns(views, &virtual_columns, tracks.columns())?;
-        let images = each(views, |view| self.image(&view.image), self.watch)?;
+        let images = each(views, |view| self.image(&view.image))?;
         let pick = |row: &Vec<Option<Point>>| columns.iter().map(|c| row[c - 1]).collect();
         let in_column =
             |column: usize| Target::Tracks(tracks.rows().iter().map(|row| row[column - 1]).collect());
@@ -38,7 +38,7 @@ impl Loader<'_> {
         let size = self.size(goals, own)?;
         let tracks = tracks.rows().iter().map(pick).collect();
         let kind = Kind::Uncalibrated { images, tracks, targets, size };
-        Ok(Inputs { kind, calibration: None, notes: Vec::new() })
+        Ok(Inputs { kind, numbers: (0..views.len()).collect(), hidden: Vec::new(), notes: Vec::new() })
     }
 
     /// What the goals ask for; `in_column` gives the positions in a column of the tracks.

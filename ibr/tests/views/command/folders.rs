@@ -2,7 +2,6 @@
 
 use super::*;
 use hybank_ibr::camera::colmap::parse_model;
-use hybank_ibr::image::{MOST_PIXELS, read_map};
 
 /// The photographs of the synthetic rig under some names in a folder of their own.
 fn photographs(names: &[(&str, &str)]) -> tempfile::TempDir {
@@ -41,38 +40,6 @@ fn two_photographs_are_a_rig() {
     let scene = is_rendered(dir.path(), &["set"], 27.0);
     assert_eq!(scene.matches("disparity = \"matched\"").count(), 2, "{scene}");
     assert_eq!(is_rendered(dir.path(), &["set/a.png", "set/b.png"], 27.0), scene);
-}
-
-#[test]
-fn a_set_of_middlebury_has_its_scale() {
-    let dir = photographs(&[("left.png", "im2.png"), ("middle.png", "im4.png"), ("right.png", "im6.png")]);
-    let exact = rig();
-    for (name, map) in [("left.pfm", "disp2.png"), ("right.pfm", "disp6.png")] {
-        let (width, height, values) = read_map(&exact.path().join(name), MOST_PIXELS).unwrap();
-        let stored =
-            Image::new(width, height, 1, values.iter().map(|v| (8.0 * v).round()).collect()).unwrap();
-        assert!(stored.data().iter().all(|v| *v < 255.0));
-        save(&stored, &dir.path().join("set").join(map)).unwrap();
-    }
-    let scene = is_rendered(dir.path(), &["set"], 30.0);
-    assert!(scene.contains("disparity_scale = 8.0\n") && scene.contains("im6.png"), "{scene}");
-}
-
-#[test]
-fn a_calibrated_pair_needs_one_map_at_most() {
-    let names = [("left.png", "im0.png"), ("right.png", "im1.png"), ("left.pfm", "disp0.pfm")];
-    let dir = photographs(&names);
-    let calib = format!(
-        "cam0=[108 0 60; 0 108 45; 0 0 1]\ncam1=[108 0 60; 0 108 45; 0 0 1]\ndoffs=0\nbaseline=100\nwidth={}\nheight={}\n",
-        SIZE.0, SIZE.1
-    );
-    std::fs::write(dir.path().join("set/calib.txt"), calib).unwrap();
-    let scene = is_rendered(dir.path(), &["set"], 27.0);
-    assert!(scene.contains("calib = \"set/calib.txt\"") && scene.contains("disp0.pfm"), "{scene}");
-    assert_eq!(scene.matches("\"matched\"").count(), 1, "{scene}");
-    std::fs::remove_file(dir.path().join("set/disp0.pfm")).unwrap();
-    let scene = is_rendered(dir.path(), &["set"], 27.0);
-    assert_eq!(scene.matches("\"matched\"").count(), 2, "{scene}");
 }
 
 /// A COLMAP workspace of three cameras side by side, without depth maps; truth.png is the view half-way

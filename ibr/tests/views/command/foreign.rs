@@ -49,9 +49,7 @@ fn foreign_text_in_files_is_quoted_and_bounded() {
             check(&scene.replacen(from, &to, 1), from);
         }
         check(text, "no scene");
-        check(&format!("calib = {quoted}"), "calib");
-        write("calib.txt", &format!("cam0=[{text}]\nwidth={text}\n"));
-        check("calib = \"calib.txt\"", "calib.txt");
+        check(&format!("unknown = {quoted}"), "unknown");
         let json = |frames: &str| format!("{{\"w\": 4, \"h\": 4, \"frames\": {frames}}}");
         let pose = "[[1,0,0,0],[0,1,0,0],[0,0,1,0]]";
         for transforms in [
@@ -88,5 +86,29 @@ fn foreign_text_in_files_is_quoted_and_bounded() {
         check(&scene.replacen("left.pfm", "bad.pfm", 1), "pfm");
         write("bad.png", text);
         check(&scene.replacen("left.png", "bad.png", 1), "png");
+    }
+}
+
+#[test]
+fn foreign_names_and_arguments_are_quoted_and_bounded() {
+    let dir = rig();
+    let long = "y".repeat(50_000);
+    for text in [HOSTILE, &long] {
+        for arguments in [
+            &["render", text, "-o", "o.png"][..],
+            &["render", "scene.toml", "-o", text],
+            &["render", "scene.toml", "-o", &format!("{text}.png")],
+            &["render", "scene.toml", "-o", "o.png", "--view", text],
+            &["render", "scene.toml", "-o", "o.png", "--truth", text],
+            &["render", "scene.toml", "-o", "o.png", "--unknown", text],
+            &["render", "scene.toml", "-o", "o.png", &format!("--{text}")],
+            &["bound", text],
+            &["evaluate", text],
+            &["evaluate", "scene.toml", "--every", text],
+            &[text],
+        ] {
+            let what = format!("{:?}", &arguments[..arguments.len() - 1]);
+            assert!(!said(dir.path(), arguments, &what).is_empty() || text == HOSTILE, "{what}");
+        }
     }
 }

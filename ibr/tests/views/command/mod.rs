@@ -1,9 +1,9 @@
 //! The binary as a user runs it, with exit code, standard output and standard error checked separately.
 
+use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::DepthMap;
 use hybank_ibr::image::{Image, pfm, save};
-use hybank_ibr::synthetic::{SyntheticScene, rig_camera, rig_disparity};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -12,11 +12,12 @@ mod colmap;
 #[cfg(unix)]
 mod disturbed;
 mod doors;
+mod evaluate;
 mod folders;
 mod foreign;
+mod inputs;
 mod mistakes;
 mod path;
-mod place;
 mod readme;
 mod refuse;
 mod render;

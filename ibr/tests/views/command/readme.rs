@@ -1,6 +1,6 @@
 //! The commands of README.md run as they stand.
 
-use super::{good, rig};
+use super::{good, inputs, rig};
 use std::fs;
 
 /// The blocks that begin with this fence.
@@ -23,6 +23,12 @@ fn folder() -> tempfile::TempDir {
     for name in ["left.png", "right.png"] {
         fs::copy(path(name), path("folder").join(name)).unwrap();
     }
+    let capture = inputs::folder();
+    fs::create_dir(path("capture")).unwrap();
+    for file in fs::read_dir(capture.path().join("set")).unwrap().map(Result::unwrap) {
+        fs::copy(file.path(), path("capture").join(file.file_name())).unwrap();
+    }
+    fs::write(path("camera_path.json"), inputs::camera_path(&[0.0, 0.3])).unwrap();
     dir
 }
 

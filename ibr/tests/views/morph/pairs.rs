@@ -1,10 +1,10 @@
 //! Pairs of synthetic photographs with tracks, and the view between them.
 
 use crate::support::normal::normal;
+use crate::synthetic::SyntheticScene;
 use hybank_ibr::camera::Camera;
 use hybank_ibr::depth::DepthMap;
 use hybank_ibr::image::Image;
-use hybank_ibr::synthetic::SyntheticScene;
 use hybank_ibr::uncalibrated::Point;
 use nalgebra::{Matrix3, Matrix3x4, Rotation3, Vector3};
 

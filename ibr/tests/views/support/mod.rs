@@ -3,3 +3,4 @@
 pub(crate) mod bilinear;
 pub(crate) mod noise;
 pub(crate) mod normal;
+pub(crate) mod render;

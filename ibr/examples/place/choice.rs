@@ -1,6 +1,5 @@
 //! The choice of some views out of many by the error that they have together.
 
-use crate::interpolate::Watch;
 use std::collections::BTreeMap;
 
 /// So many sets are all tried; the search for a good one takes hundreds too.
@@ -16,15 +15,15 @@ const PASSES: usize = 4;
 
 /// A choice of views.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Choice {
+pub(crate) struct Choice {
     /// The views, by number from 0.
-    pub views: Vec<usize>,
+    pub(crate) views: Vec<usize>,
     /// Their error.
-    pub error: f64,
+    pub(crate) error: f64,
     /// Sets of so many views that were tried.
-    pub tried: usize,
+    pub(crate) tried: usize,
     /// Whether these are all sets.
-    pub is_exhaustive: bool,
+    pub(crate) is_exhaustive: bool,
 }
 
 impl Choice {
@@ -36,18 +35,13 @@ impl Choice {
     ///
     /// # Errors
     /// Those of `error`.
-    pub fn least<E>(
+    pub(crate) fn least<E>(
         candidates: usize,
         count: usize,
         error: impl FnMut(&[usize]) -> Result<f64, E>,
-        watch: Watch<'_>,
     ) -> Result<Option<Self>, E> {
         let is_exhaustive = sets(candidates, count) <= MOST_SETS;
-        let expected = match is_exhaustive {
-            true => sets(candidates, count),
-            false => (STARTS * candidates * count * 2) as f64,
-        };
-        let mut search = Search { candidates, error, known: BTreeMap::new(), expected, watch };
+        let mut search = Search { candidates, error, known: BTreeMap::new() };
         match is_exhaustive {
             true => search.every(&mut Vec::new(), count)?,
             false => search.exchanges(count)?,
@@ -69,17 +63,14 @@ fn sets(candidates: usize, count: usize) -> f64 {
     (0..count.min(candidates.saturating_sub(count))).map(factor).product::<f64>().round()
 }
 
-struct Search<'a, F> {
+struct Search<F> {
     candidates: usize,
     error: F,
     /// The errors of sets, in the order of their views.
     known: BTreeMap<Vec<usize>, f64>,
-    /// Sets that are tried, about.
-    expected: f64,
-    watch: Watch<'a>,
 }
 
-impl<E, F: FnMut(&[usize]) -> Result<f64, E>> Search<'_, F> {
+impl<E, F: FnMut(&[usize]) -> Result<f64, E>> Search<F> {
     fn error_of(&mut self, mut views: Vec<usize>) -> Result<f64, E> {
         views.sort_unstable();
         if let Some(known) = self.known.get(&views) {
@@ -87,7 +78,6 @@ impl<E, F: FnMut(&[usize]) -> Result<f64, E>> Search<'_, F> {
         }
         let error = (self.error)(&views)?;
         self.known.insert(views, error);
-        (self.watch)(self.known.len() as f64 / self.expected);
         Ok(error)
     }
 
@@ -162,7 +152,7 @@ mod tests {
     }
 
     fn least(candidates: usize, count: usize) -> Option<Choice> {
-        Choice::least(candidates, count, error, &|_| ()).unwrap()
+        Choice::least(candidates, count, error).unwrap()
     }
 
     #[test]
@@ -186,6 +176,6 @@ mod tests {
     fn sets_are_counted_and_errors_end_the_search() {
         assert_eq!((sets(20, 4), sets(5, 5), sets(4, 1)), (4845.0, 1.0, 4.0));
         assert!(sets(5000, 2500) > 1e300);
-        assert_eq!(Choice::least(3, 2, |_| Err("unreadable"), &|_| ()), Err("unreadable"));
+        assert_eq!(Choice::least(3, 2, |_| Err("unreadable")), Err("unreadable"));
     }
 }

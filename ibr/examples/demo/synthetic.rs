@@ -3,9 +3,11 @@
 //! Curved and slanted textured surfaces in front of a wall, seen by any pinhole camera. Colours are
 //! averaged over 3 x 3 rays per pixel, depth is that of the central ray.
 
-use crate::camera::Camera;
-use crate::depth::{DepthMap, Measure};
-use crate::image::Image;
+#![allow(dead_code, reason = "each of those who draw the scene uses a part")]
+
+use hybank_ibr::camera::Camera;
+use hybank_ibr::depth::{DepthMap, Measure};
+use hybank_ibr::image::Image;
 use nalgebra::{Matrix3x4, Vector3};
 use rayon::prelude::*;
 
@@ -58,7 +60,7 @@ impl Painted {
 }
 
 /// The scene: a slanted wall, a ball and two discs at depths from 3 to 9.
-pub struct SyntheticScene {
+pub(crate) struct SyntheticScene {
     surfaces: Vec<Painted>,
 }
 
@@ -84,7 +86,7 @@ impl Default for SyntheticScene {
 
 impl SyntheticScene {
     /// The wall with a ball and three discs at places that depend on the seed: other scenes of one kind.
-    pub fn varied(seed: u64) -> Self {
+    pub(crate) fn varied(seed: u64) -> Self {
         // Fractional parts of multiples of the golden ratio and its kin: spread evenly, without a generator.
         let part = |k: u64| (0.618_033_988_75 * (seed * 31 + k * 7 + 1) as f64).fract();
         let between = |k: u64, low: f64, high: f64| low + (high - low) * part(k);
@@ -107,7 +109,7 @@ impl SyntheticScene {
 
     /// Image (RGB) and depth of the scene for a metric camera. The wall fills every view that looks along
     /// +z.
-    pub fn view(&self, camera: &Camera, (width, height): (usize, usize)) -> (Image, DepthMap) {
+    pub(crate) fn view(&self, camera: &Camera, (width, height): (usize, usize)) -> (Image, DepthMap) {
         let mut colours = vec![0.0_f32; width * height * 3];
         let mut depths = vec![f32::NAN; width * height];
         let rows = colours.par_chunks_exact_mut(width * 3).zip(depths.par_chunks_exact_mut(width));
@@ -121,7 +123,7 @@ impl SyntheticScene {
         });
         let mut image = Image::filled(width, height, 3, 0.0);
         image.data_mut().copy_from_slice(&colours);
-        (image, DepthMap::from_known((width, height), depths, Measure::Depth))
+        (image, map((width, height), depths, Measure::Depth))
     }
 
     fn average(&self, camera: &Camera, x: f64, y: f64) -> [f64; 3] {
@@ -146,12 +148,12 @@ impl SyntheticScene {
 }
 
 /// Focal length of [`rig_camera`] in units of the image width.
-pub const RIG_FOCAL: f64 = 0.9;
+pub(crate) const RIG_FOCAL: f64 = 0.9;
 /// Distance between the rig's cameras 0 and 1 in scene units.
-pub const RIG_BASELINE: f64 = 0.35;
+pub(crate) const RIG_BASELINE: f64 = 0.35;
 
 /// Camera of a rectified rig at `position` (in baselines) looking along +z.
-pub fn rig_camera(position: f64, (width, height): (usize, usize)) -> Matrix3x4<f64> {
+pub(crate) fn rig_camera(position: f64, (width, height): (usize, usize)) -> Matrix3x4<f64> {
     let focal = RIG_FOCAL * width as f64;
     let (cx, cy) = ((width as f64 - 1.0) / 2.0, (height as f64 - 1.0) / 2.0);
     let shift = -focal * RIG_BASELINE * (position - 0.5);
@@ -159,38 +161,12 @@ pub fn rig_camera(position: f64, (width, height): (usize, usize)) -> Matrix3x4<f
 }
 
 /// Disparity of the rig for a baseline of one, from depth.
-pub fn rig_disparity(depth: &DepthMap, width: usize) -> DepthMap {
+pub(crate) fn rig_disparity(depth: &DepthMap, width: usize) -> DepthMap {
     let product = (RIG_FOCAL * RIG_BASELINE * width as f64) as f32;
     let data = depth.data().iter().map(|d| product / d).collect();
-    DepthMap::from_known(depth.size(), data, Measure::Disparity)
+    map(depth.size(), data, Measure::Disparity)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn depth_is_where_the_ray_meets_the_surface() {
-        let size = (64, 48);
-        let scene = SyntheticScene::default();
-        let camera = Camera::metric(rig_camera(0.5, size), false).unwrap();
-        let (image, depth) = scene.view(&camera, size);
-        assert_eq!((image.size(), depth.unknown()), (size, 0));
-        let wall = |x: f64, y: f64| {
-            let r = camera.unproject(x, y, 1.0) - camera.centre();
-            let n = Vector3::new(0.12, 0.05, -1.0);
-            n.dot(&Vector3::new(0.0, 0.0, 9.0)) / n.dot(&r)
-        };
-        assert!((f64::from(depth.data()[0]) - wall(0.0, 0.0)).abs() < 1e-5);
-        let near = depth.data().iter().copied().fold(f32::MAX, f32::min);
-        assert!((3.0..3.6).contains(&near), "{near}");
-    }
-
-    #[test]
-    fn the_ball_is_hit_on_its_near_side() {
-        let ball = Surface::Ball { centre: Vector3::new(0.0, 0.0, 5.0), radius: 1.0 };
-        assert_eq!(ball.hit(&Vector3::zeros(), &Vector3::z()), Some(4.0));
-        assert_eq!(ball.hit(&Vector3::zeros(), &Vector3::x()), None);
-        assert_eq!(ball.hit(&Vector3::zeros(), &-Vector3::z()), None);
-    }
+fn map(size: (usize, usize), values: Vec<f32>, measure: Measure) -> DepthMap {
+    DepthMap::new(size, values, 1.0, measure).expect("rays meet the wall")
 }
