@@ -4,7 +4,7 @@ use crate::errors::{capture_error, refused, warn};
 use crate::formats::ArrayFormat;
 use hybank::bank::FrameLayout;
 use hybank::captures::Captures;
-use hybank::io::{DecodedFrames, Decoder, StatedScale, StreamHeader};
+use hybank::io::{DecodeError, DecodedFrames, Decoder, StatedScale, StreamHeader};
 use hybank::runtime::{FrameSource, PcmFrames, SampleLayout, SideBySide};
 use numpy::ndarray::Axis;
 use numpy::{
@@ -138,7 +138,7 @@ impl<'py> Held<'py> {
     /// What reads the samples, of each recording, as numbers.
     pub(crate) fn decoders(&self) -> PyResult<Vec<Decoder>> {
         let decoder = |frames: &PcmFrames<'_>| Decoder::new(frames, self.format.complex, self.scale);
-        self.recordings()?.iter().map(decoder).collect::<Result<_, _>>().map_err(refused)
+        self.recordings()?.iter().map(decoder).collect::<Result<_, _>>().map_err(decode_error)
     }
 
     /// The samples of full scale 1. What is odd about them the decoders know.
@@ -148,9 +148,9 @@ impl<'py> Held<'py> {
         let mut each = decoders.iter_mut().zip(&stored);
         if self.scale.changes(&StreamHeader::real(layout, 1)) {
             let decoded = each.map(|(decoder, stored)| decoder.decode(stored)).collect::<Result<_, _>>();
-            return Ok(Samples::Decoded(decoded.map_err(refused)?));
+            return Ok(Samples::Decoded(decoded.map_err(decode_error)?));
         }
-        each.try_for_each(|(decoder, stored)| decoder.judge(stored)).map_err(refused)?;
+        each.try_for_each(|(decoder, stored)| decoder.judge(stored)).map_err(decode_error)?;
         Ok(Samples::Stored(stored, self.format))
     }
 
@@ -161,7 +161,7 @@ impl<'py> Held<'py> {
         let each = decoders.iter_mut().zip(&stored);
         let decode =
             |(decoder, frames): (&mut Decoder, &PcmFrames<'_>)| decoder.decode(&frames.range(0..most));
-        each.map(decode).collect::<Result<_, _>>().map_err(refused)
+        each.map(decode).collect::<Result<_, _>>().map_err(decode_error)
     }
 
     /// The samples as a recorder has them; the parts of complex ones take turns.
@@ -187,20 +187,29 @@ impl<'py> Held<'py> {
         let mut decoders = self.decoders()?;
         let decode = |(decoder, frames): (&mut Decoder, &PcmFrames<'_>)| decoder.decode(frames);
         let decoded = decoders.iter_mut().zip(&self.recordings()?).map(decode).collect::<Result<Vec<_>, _>>();
-        let decoded = decoded.map_err(refused)?;
-        warn_of(self.py(), &decoders)?;
+        let decoded = decoded.map_err(decode_error)?;
+        odd_of(&decoders).iter().try_for_each(|text| warn(self.py(), text))?;
         Captures::of_frames(&decoded).map_err(capture_error)
     }
 }
 
-/// Warns of what is odd about samples.
-pub(crate) fn warn_of(py: Python<'_>, decoders: &[Decoder]) -> PyResult<()> {
-    let mut faults =
-        decoders.iter().enumerate().flat_map(|(k, decoder)| decoder.faults().map(move |fault| (k, fault)));
-    faults.try_for_each(|(k, fault)| match decoders.len() {
-        1 => warn(py, &format!("the samples: {fault}")),
-        _ => warn(py, &format!("channel {}: {fault}", k + 1)),
-    })
+/// What is odd about samples.
+pub(crate) fn odd_of(decoders: &[Decoder]) -> Vec<String> {
+    let name = |k: usize| match decoders.len() {
+        1 => "the samples".to_owned(),
+        _ => format!("channel {}", k + 1),
+    };
+    let of_one = |(k, decoder): (usize, &Decoder)| {
+        decoder.faults().map(|fault| format!("{}: {fault}", name(k))).collect::<Vec<_>>()
+    };
+    decoders.iter().enumerate().flat_map(of_one).collect()
+}
+
+fn decode_error(error: DecodeError) -> PyErr {
+    match error {
+        DecodeError::Memory(error) => capture_error(error.into()),
+        other => refused(other),
+    }
 }
 
 impl ArrayShape {

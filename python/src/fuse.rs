@@ -1,6 +1,6 @@
 //! Fuses arrays.
 
-use crate::arrays::{ArrayShape, Held, warn_of};
+use crate::arrays::{ArrayShape, Held, odd_of};
 use crate::background::{self, SignalCheck};
 use crate::errors::{capture_error, refused, warn};
 use crate::formats::ArrayFormat;
@@ -93,6 +93,8 @@ pub(crate) struct FusedArray<'py> {
     latency_dropped: usize,
     seconds: f64,
     peak: f64,
+    /// What is odd about the samples of the input.
+    odd: Vec<String>,
 }
 
 /// The output samples of an array.
@@ -129,7 +131,6 @@ fn filtered<'py>(
     let mut array = NewArray::new(py, frames * bank.ratio, format)?;
     let mut decoders = held.decoders()?;
     let samples = held.samples(&mut decoders)?;
-    warn_of(py, &decoders)?;
     let (parts, mut room) = (samples.parts(), array.room()?);
     let parts: Vec<_> = parts.iter().map(|part| Frames::new(&**part, 0..frames)).collect();
     let parts: Vec<&dyn FrameSource> = parts.iter().map(|part| part as _).collect();
@@ -141,6 +142,7 @@ fn filtered<'py>(
         // A frame may hold several samples of a converter.
         outcome: Outcome { clipped: room.clipped, channels: bank.channel_count(), ..outcome },
         peak: room.peak(frames * bank.ratio * parts.len()),
+        odd: odd_of(&decoders),
         y: array.finish()?,
         captures: Verdict::Unjudged.into(),
         frames,
@@ -156,7 +158,8 @@ impl FusedArray<'_> {
             Warning::Clipped(_) => format!("{warning}; a dtype of floats keeps them"),
             _ => warning.to_string(),
         };
-        self.outcome.warnings().map(text).chain(self.captures.warnings()).collect()
+        let of_run = self.outcome.warnings().map(text).chain(self.captures.warnings());
+        self.odd.iter().cloned().chain(of_run).collect()
     }
 
     /// The report of a run with so many output samples per second, as that of the command line.

@@ -87,6 +87,8 @@ def test_archives_as_short_as_a_span_or_the_latency(fir, tmp_path, frames):
         assert y.tobytes() == fir.fuse(x, algorithm=algorithm).tobytes()
 
 
+# Integers of three times full scale are clipped.
+@pytest.mark.filterwarnings("ignore:.*where it clips")
 @pytest.mark.parametrize("dtype, output", [("i2", "i2"), ("f4", "i4"), ("c8", None), ("i2", None), ("f8", "f4")])
 def test_samples_are_counted_once(fir, tmp_path, dtype, output):
     x = 3 * drawn("noise", 2)

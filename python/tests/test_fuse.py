@@ -232,15 +232,15 @@ def test_wrong_arrays_are_refused_with_the_remedy(fir):
         (np.zeros((3, 100)), "3 channels"),
         (np.zeros(100), "1 channels"),
         (np.zeros((2, 2, 2)), "3 dimensions"),
-        (np.zeros((2, 10), "i8"), "convert them to float32"),
-        (np.zeros((2, 10), "O"), "convert them to float32"),
+        (np.zeros((2, 10), "u8"), "convert them to floats"),
+        (np.zeros((2, 10), "O"), "convert them to floats"),
     ]:
         with pytest.raises(hb.HybankError, match=words):
             fir.fuse(x)
     x = np.zeros((2, 10))
     for keywords, words in [
         ({"axis": 2}, "axis of time"),
-        ({"dtype": "i8"}, "choose one"),
+        ({"dtype": "u8"}, "choose one"),
         ({"dtype": "c8"}, "samples are real"),
         ({"algorithm": "fft"}, "choose auto"),
     ]:

@@ -64,6 +64,7 @@ def test_no_frames_give_no_samples(fir, iir, shape, axis, order, dtype):
         assert s.process(x).shape == (0,) and s.position == 0
 
 
+@pytest.mark.filterwarnings("ignore:.*its samples reach 1e308")
 def test_huge_values_and_nan_stay_where_they_are(fir, iir):
     for bank in (fir, iir):
         x = np.zeros((2, 600))
@@ -78,9 +79,9 @@ def test_huge_values_and_nan_stay_where_they_are(fir, iir):
     assert report.replaced == 20 and not y.any()
 
 
-@pytest.mark.parametrize("dtype", ["u8", "?", "g", "M8[s]", "U3"])
+@pytest.mark.parametrize("dtype", ["u8", "g", "M8[s]", "U3"])
 def test_other_number_types_are_refused_with_the_ones_that_are_read(fir, dtype):
-    with pytest.raises(hb.HybankError, match=r"convert them to float32, .* complex128"):
+    with pytest.raises(hb.HybankError, match=r"convert them to floats .* complex"):
         fir.fuse(np.zeros((2, 4), dtype))
 
 

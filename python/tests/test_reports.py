@@ -156,7 +156,7 @@ def test_what_a_run_tolerates_is_a_warning(fir, folder):
         _, report = fir.fuse(x, dtype="i2", full_output=True)
     assert [str(one.message) for one in caught] == report.warnings and len(report.warnings) == 2
     assert all(one.filename == __file__ for one in caught)
-    assert report.replaced == 1 and report.clipped > 50 and report.peak == 1 - 2**-15
+    assert report.replaced == 1 and report.clipped > 50 and report.peak > 1
     np.save(folder / "nan.npy", 0.4 * x.T)
     with pytest.warns(UserWarning, match="replaced by 0") as caught:
         fir.fuse([folder / "nan.npy"])

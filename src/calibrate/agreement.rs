@@ -51,8 +51,7 @@ pub enum Verdict {
     Explained(f64),
     /// The same, and the signal does not tell its delays.
     #[error(
-        "the captures agree with the spec in starts, polarities, gains and order, which vouches for no SNR, as this \
-         signal does not tell its delays"
+        "the captures do not contradict the spec, but this signal does not tell its delays, so no SNR is vouched for"
     )]
     DelaysUntold(f64),
     /// Aliases overlap, or the signal fits other starts as well.
@@ -62,7 +61,7 @@ pub enum Verdict {
     #[error("fewer than {LEAST_FRAMES} frames do not tell whether the captures agree with the spec")]
     Short,
     /// They hold no signal.
-    #[error("the captures hold no signal")]
+    #[error("the frames that were compared with the spec hold no signal")]
     NoSignal,
     /// There is one channel, or there are too many.
     #[error("captures are compared with the spec for 2 to {MOST_CHANNELS} channels")]
@@ -182,13 +181,20 @@ fn judged(spec: &Spec, found: &Starts, delays: Delays) -> Agreement {
         contradictions = delays.contradictions;
     }
     contradictions.extend(gains(spec, found));
-    let share = 1.0 - found.implausible;
+    let share = (1.0 - found.implausible - unequal_gains(&found.gains)).max(0.0);
     let verdict = match found.implausible <= UNEXPLAINED_SHARE {
         true if delays.are_told => Verdict::Explained(share),
         true => Verdict::DelaysUntold(share),
         false => Verdict::Undecided,
     };
     Agreement { contradictions, verdict }
+}
+
+/// The mean square of the relative deviations of gains from their mean: the share of the power that lies in
+/// images.
+fn unequal_gains(gains: &[f64]) -> f64 {
+    let mean = gains.iter().sum::<f64>() / gains.len() as f64;
+    gains.iter().map(|gain| (gain / mean - 1.0).powi(2)).sum::<f64>() / gains.len() as f64
 }
 
 /// The channels whose level is far below that of the strongest one.
@@ -256,6 +262,7 @@ mod tests {
     use super::*;
     use crate::calibrate::testbench::gaussian;
     use crate::random::Random;
+    use std::f64::consts::TAU;
 
     /// Two converters of 24 kHz, 1.2 and 0.6 fast samples late, after a low-pass of 9 kHz.
     fn speech() -> Spec {
@@ -269,7 +276,7 @@ mod tests {
     fn recorded(frames: usize, noise: f64, dice: &mut Random) -> Vec<Vec<f64>> {
         let fine = 10;
         let (mut y, mut z) = (0.0, 0.0);
-        let pole: f64 = (-std::f64::consts::TAU * 3e3 / 480e3).exp();
+        let pole: f64 = (-TAU * 3e3 / 480e3).exp();
         let wave: Vec<f64> = (0..(frames + 2) * 2 * fine)
             .map(|_| {
                 y = pole * y + (1.0 - pole) * gaussian(dice);
@@ -311,7 +318,7 @@ mod tests {
     #[test]
     fn a_chirp_with_a_wrong_delay_is_not_said_to_agree() {
         let chirp = |late: f64| {
-            let phase = |t: f64| std::f64::consts::TAU * (50.0 * t + 0.5 * 12_950.0 * t * t);
+            let phase = |t: f64| TAU * (50.0 * t + 0.5 * 12_950.0 * t * t);
             (1..24_000).map(|k| phase((2.0 * f64::from(k) - late) / 48e3).sin()).collect::<Vec<f64>>()
         };
         for late in [0.98, 0.3] {
@@ -392,8 +399,11 @@ mod tests {
     /// A gain that is wrong by 4 % costs the bank what the verdict says.
     #[test]
     fn an_agreement_vouches_for_no_more_than_the_gains_allow() {
-        let mut dice = Random(55);
-        let mut records = recorded(20_000, 0.0, &mut dice);
+        let tone = |k: u32, t: f64| (TAU * 37.3 * f64::from(k) * t + f64::from(k * k)).cos();
+        let mut records = [1.2, 0.6].map(|late| {
+            let value = |n: u32| (1..200).map(|k| tone(k, (f64::from(2 * n) - late) / 48e3)).sum();
+            (0..16_384).map(value).collect::<Vec<f64>>()
+        });
         records[1].iter_mut().for_each(|x| *x *= 1.04);
         let Verdict::Explained(share) = found(&records).verdict else { panic!() };
         // Half of the difference is in each channel: 20 log10(2 / 0.04) = 34 dB.

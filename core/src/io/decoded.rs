@@ -2,11 +2,23 @@
 
 use super::block::{Block, RecordedFrames};
 use super::full_scale::{Scaling, StatedScale};
-use super::{InputFault, StreamHeader};
+use super::{InputFault, OfflineError, StreamHeader};
 use crate::runtime::PcmFrames;
 
 /// Frames that are judged at a time.
 const STEP: usize = 1 << 16;
+
+/// Frames in memory that cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DecodeError {
+    /// Codes beyond their full scale, or a full scale that the words of the samples cannot hold.
+    #[error("{0}")]
+    Scale(String),
+    /// The system does not have the memory: [`OfflineError::Memory`].
+    #[error(transparent)]
+    Memory(OfflineError),
+}
 
 /// Reads the frames of one recording, piece by piece, as numbers of full scale 1.
 #[derive(Debug, Clone)]
@@ -20,35 +32,35 @@ impl Decoder {
     ///
     /// # Errors
     /// A full scale that the words of the samples cannot hold.
-    pub fn new(stored: &PcmFrames<'_>, is_complex: bool, scale: StatedScale) -> Result<Self, String> {
+    pub fn new(stored: &PcmFrames<'_>, is_complex: bool, scale: StatedScale) -> Result<Self, DecodeError> {
         let parts = if is_complex { 2 } else { 1 };
         let header =
             StreamHeader { is_complex, ..StreamHeader::real(stored.layout, stored.channels / parts) };
-        Ok(Self { header, scaling: Scaling::new(&header, scale)? })
+        Ok(Self { header, scaling: Scaling::new(&header, scale).map_err(DecodeError::Scale)? })
     }
 
     /// The next frames.
     ///
     /// # Errors
     /// Codes beyond the full scale, or too little memory.
-    pub fn decode(&mut self, stored: &PcmFrames<'_>) -> Result<DecodedFrames, String> {
+    pub fn decode(&mut self, stored: &PcmFrames<'_>) -> Result<DecodedFrames, DecodeError> {
         let mut block = Block::default();
         self.decode_into(stored, &mut block)?;
         Ok(DecodedFrames { block, rails: self.scaling.rails() })
     }
 
-    fn decode_into(&mut self, stored: &PcmFrames<'_>, block: &mut Block) -> Result<(), String> {
+    fn decode_into(&mut self, stored: &PcmFrames<'_>, block: &mut Block) -> Result<(), DecodeError> {
         block.begin(&self.header);
-        let memory = |_| format!("{} frames do not fit in memory; use a part of them", stored.frames());
-        block.decode(stored).map_err(memory)?;
-        self.scaling.take(block, 0)
+        let (frames, channels) = (stored.frames(), stored.channels);
+        block.decode(stored).map_err(|_| DecodeError::Memory(OfflineError::Memory { frames, channels }))?;
+        self.scaling.take(block, 0).map_err(DecodeError::Scale)
     }
 
     /// Judges frames that are read where they lie.
     ///
     /// # Errors
     /// As [`Decoder::decode`].
-    pub fn judge(&mut self, stored: &PcmFrames<'_>) -> Result<(), String> {
+    pub fn judge(&mut self, stored: &PcmFrames<'_>) -> Result<(), DecodeError> {
         let mut block = Block::default();
         let mut steps = (0..stored.frames()).step_by(STEP).map(|first| stored.range(first..first + STEP));
         steps.try_for_each(|step| self.decode_into(&step, &mut block))

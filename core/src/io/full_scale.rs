@@ -16,6 +16,8 @@ const UNUSED_BITS: u32 = 3;
 const ENOUGH_CODES: u64 = 256;
 /// So many times as often as a sine of full scale does a signal that is clipped reach the ends of the range.
 const CLIPPED_FACTOR: f64 = 2.0;
+/// As many samples may be there by chance in a short recording.
+const FEW_AT_RAILS: f64 = 16.0;
 /// Floats of streams have full scale 1 by convention, and may exceed it; nobody means so many times as much.
 const WILD_PEAK: f64 = 1e3;
 
@@ -24,7 +26,8 @@ const WILD_PEAK: f64 = 1e3;
 pub struct StatedScale {
     /// By the user, for every input.
     pub given: Option<FullScale>,
-    /// By the spec, for inputs [that state none](StreamHeader::is_scaled).
+    /// By the spec, for inputs [that state none](StreamHeader::is_scaled); of WAV and FLAC it is taken where
+    /// their codes fit it.
     pub of_spec: Option<FullScale>,
     /// Bits of the converters by the spec, for integers that state none.
     pub bits: Option<u32>,
@@ -37,8 +40,14 @@ impl StatedScale {
         let narrower = |bits: &u32| header.word.is_some_and(|word| *bits < word.bits);
         let of_header = header.valid_bits.filter(narrower).map(|bits| (FullScale::Signed(bits), false));
         let of_spec = || self.of_spec.or(self.bits.filter(narrower).map(FullScale::Signed));
-        let of_spec = if header.is_scaled { None } else { of_spec() };
-        self.given.or(of_spec).map(|scale| (scale, true)).or(of_header)
+        // What a header states is what its writer believed.
+        let codes = |scale: &FullScale| header.word.is_some() && scale.rails().is_some();
+        let against_header = || self.of_spec.filter(codes).map(|scale| (scale, false));
+        match self.given {
+            Some(scale) => Some((scale, true)),
+            None if header.is_scaled => against_header().or(of_header),
+            None => of_spec().map(|scale| (scale, true)),
+        }
     }
 
     /// A number of a table, of full scale 1.
@@ -136,6 +145,13 @@ impl Scaling {
     pub(super) fn new(header: &StreamHeader, stated: StatedScale) -> Result<Self, String> {
         let found = stated.of(header);
         let scale = found.map(|(scale, _)| header.word.map_or(scale, |word| word.codes(scale)));
+        let is_binding = found.is_some_and(|(_, is_binding)| is_binding);
+        let too_wide = |scale: FullScale, word: Word| match scale {
+            FullScale::Signed(bits) | FullScale::Unsigned(bits) => bits > word.bits,
+            FullScale::Number(_) => false,
+        };
+        let is_too_wide = scale.zip(header.word).is_some_and(|(scale, word)| too_wide(scale, word));
+        let scale = scale.filter(|_| is_binding || !is_too_wide);
         if let (Some(word), Some(FullScale::Signed(bits) | FullScale::Unsigned(bits))) = (header.word, scale)
             && bits > word.bits
         {
@@ -147,11 +163,11 @@ impl Scaling {
         Ok(Self {
             word: header.word,
             scale,
-            is_binding: found.is_some_and(|(_, is_binding)| is_binding),
+            is_binding,
             is_open: found.is_none() && !header.is_scaled,
             usual_peak: WILD_PEAK,
             place: Place::Open,
-            codes: Codes::default(),
+            codes: Codes::NONE,
             rails: stated.rails(header),
             seen: Seen::new(stated.rails(header)),
             frames: 0,
@@ -269,7 +285,8 @@ impl Scaling {
         let clipped = self.rails.is_some_and(|(_, highest)| {
             // A sine of full scale is within half a step of an end of the range for this share of the time.
             let of_sine = FRAC_2_PI * (1.0 - highest).sqrt();
-            peak <= 1.0 && at_rails as f64 > CLIPPED_FACTOR * of_sine * count as f64
+            let by_chance = (CLIPPED_FACTOR * of_sine * count as f64).max(FEW_AT_RAILS);
+            peak <= 1.0 && at_rails as f64 > by_chance
         });
         let clipped = clipped.then_some(InputFault::AtRails { count: at_rails, of: count });
         unused.into_iter().chain(beyond).chain(clipped)
@@ -289,7 +306,7 @@ fn apply(block: &mut Block, begin: usize, unit: f64, middle: f64, amplitude: f64
 }
 
 /// The codes of words so far, from the middle of their range.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Codes {
     least: i64,
     most: i64,
@@ -298,6 +315,8 @@ struct Codes {
 }
 
 impl Codes {
+    const NONE: Self = Self { least: i64::MAX, most: i64::MIN, used: 0 };
+
     fn take(&mut self, block: &Block, begin: usize, word: Word) {
         let unit = word.amplitude();
         for part in &block.parts {
@@ -443,13 +462,17 @@ mod tests {
         let high = words(&[0, 0, 0, 16384, -32768, 16]);
         for bytes in [&low, &high] {
             let (samples, faults) = scaled(header(PcmFormat::S16Le), given(S12), bytes).unwrap();
-            assert_eq!((samples, faults), (want.to_vec(), vec![InputFault::AtRails { count: 1, of: 6 }]));
+            assert_eq!((samples, faults), (want.to_vec(), vec![]));
         }
         // Bits of the spec hold for integers that state none, and for no others.
         let of_spec = StatedScale { bits: Some(12), ..StatedScale::default() };
         assert_eq!(scaled(header(PcmFormat::S16Le), of_spec, &low).unwrap().0, want);
         let wav = StreamHeader { is_scaled: true, ..header(PcmFormat::S16Le) };
         assert_eq!(scaled(wav, of_spec, &low).unwrap().0[3], 1024.0 / 32768.0);
+        // A full scale of the spec holds for WAV whose codes fit it.
+        let of_spec = StatedScale { of_spec: Some(S12), ..StatedScale::default() };
+        assert_eq!(scaled(wav, of_spec, &low).unwrap().0, want);
+        assert_eq!(scaled(wav, of_spec, &words(&[1, 16384])).unwrap().0[1], 0.5);
     }
 
     #[test]
@@ -489,6 +512,8 @@ mod tests {
             scaled(header(PcmFormat::S16Le), StatedScale::default(), &words(codes)).unwrap().1
         };
         assert_eq!(faults(&[1, 2047, -2048].repeat(100)), [InputFault::UnusedBits { bits: 16, likely: S12 }]);
+        let from_0 = scaled(header(PcmFormat::U16Le), StatedScale::default(), &words(&[1, 4095].repeat(200)));
+        assert_eq!(from_0.unwrap().1, [InputFault::UnusedBits { bits: 16, likely: U12 }]);
         for codes in [[1, 8191, -8192].repeat(200), [16, 2032].repeat(200), vec![1, 2047]] {
             assert_eq!(faults(&codes), []);
         }

@@ -28,6 +28,8 @@ const MOST_NAMED: usize = 8;
 struct Variable {
     name: String,
     class: u8,
+    /// True and false.
+    is_logical: bool,
     is_complex: bool,
     shape: Vec<u64>,
     element: Element,
@@ -190,10 +192,10 @@ impl Variable {
         let flags = words(next("class")?).first().copied().ok_or("its class is missing; save it again")?;
         let shape = words(next("shape")?).into_iter().map(u64::from).collect();
         let name = String::from_utf8_lossy(&next("name")?).into_owned();
-        // The lowest byte is the class, and bit 11 the flag of complex numbers.
-        let (class, is_complex) = ((flags & 0xFF) as u8, flags & 0x800 != 0);
+        // The lowest byte is the class; bit 9 is the flag of logical arrays, bit 11 that of complex numbers.
+        let (class, is_logical, is_complex) = ((flags & 0xFF) as u8, flags & 0x200 != 0, flags & 0x800 != 0);
         let is_named = !name.is_empty();
-        Ok(is_named.then_some(Self { name, class, is_complex, shape, element }))
+        Ok(is_named.then_some(Self { name, class, is_logical, is_complex, shape, element }))
     }
 
     /// The numbers of the first `count` parts, real and imaginary.
@@ -243,6 +245,9 @@ impl Variable {
 
     /// The header of its samples.
     fn array(&self) -> Result<ArrayHeader, String> {
+        if self.is_logical {
+            return Err("it is logical: true and false are no samples; save what they mean as numbers".into());
+        }
         let format = match self.class {
             6 => PcmFormat::F64Le,
             7 => PcmFormat::F32Le,

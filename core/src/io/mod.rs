@@ -63,7 +63,7 @@ pub mod wav;
 pub use crate::runtime::{ParsePcmFormatError, PcmFormat, PcmFrames, SampleLayout};
 pub use array::{ArrayHeader, ArrayReader};
 pub use block::{NumberFrames, RecordedFrames};
-pub use decoded::{DecodedFrames, Decoder};
+pub use decoded::{DecodeError, DecodedFrames, Decoder};
 pub use error::{InputFault, InputWarning, IoError};
 pub use frame_file::FrameFile;
 pub use full_scale::{StatedScale, Word};

@@ -12,15 +12,22 @@
 //! [`Warning`]s; nothing is printed.
 //!
 //! ```
-//! use hybank_core::bank::{Bank, SynthesisFilters}; use hybank_core::io::{PcmFormat, PcmFrames,
-//! SampleLayout}; use hybank_core::pipeline::{Block, Pipeline, Settings}; // Two time-interleaved
-//! converters. let bank = Bank::bare(SynthesisFilters::Fir(vec![vec![1.0, 0.0], vec![0.0, 1.0]]), 2); let
-//! plan = bank.plan(Default::default())?; let mut pipeline = Pipeline::new(&bank, &plan,
-//! Settings::default(), PcmFormat::S16Le, false); let mut output = Vec::new(); for frame in [[1, 2], [3,
-//! 4]].map(|frame: [i16; 2]| frame.map(i16::to_le_bytes).concat()) { let layout =
-//! SampleLayout::packed(PcmFormat::S16Le); let recording = PcmFrames { layout, channels: 2, bytes: &frame };
-//! pipeline.push_parts(&[&recording], &mut |block: Block<'_>| Ok(output.extend_from_slice(block.samples)))?;
-//! } assert_eq!(output, [1, 0, 2, 0, 3, 0, 4, 0]); assert_eq!(pipeline.finish().samples, 4);
+//! use hybank_core::bank::{Bank, SynthesisFilters};
+//! use hybank_core::io::{PcmFormat, PcmFrames, SampleLayout};
+//! use hybank_core::pipeline::{Block, Pipeline, Settings};
+//! // Two time-interleaved converters.
+//! let bank = Bank::bare(SynthesisFilters::Fir(vec![vec![1.0, 0.0], vec![0.0, 1.0]]), 2);
+//! let plan = bank.plan(Default::default())?;
+//! let mut pipeline = Pipeline::new(&bank, &plan, Settings::default(), PcmFormat::S16Le, false);
+//! let mut output = Vec::new();
+//! for frame in [[1, 2], [3, 4]].map(|frame: [i16; 2]| frame.map(i16::to_le_bytes).concat()) {
+//!     let layout = SampleLayout::packed(PcmFormat::S16Le);
+//!     let recording = PcmFrames { layout, channels: 2, bytes: &frame };
+//!     let mut write = |block: Block<'_>| Ok(output.extend_from_slice(block.samples));
+//!     pipeline.push_parts(&[&recording], &mut write)?;
+//! }
+//! assert_eq!(output, [1, 0, 2, 0, 3, 0, 4, 0]);
+//! assert_eq!(pipeline.finish().samples, 4);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

@@ -95,6 +95,10 @@ impl Numbers {
             None => {
                 let mark = if cell.contains(',') { Some(Decimal::Comma) } else { None };
                 let mark = mark.or_else(|| cell.contains('.').then_some(Decimal::Point));
+                // 1,046 may be a thousand and 46.
+                if mark == Some(Decimal::Comma) && may_be_thousands(cell) {
+                    return None;
+                }
                 let number = if mark == Some(Decimal::Comma) { with_comma(cell) } else { parse(cell) };
                 self.decimal = mark.filter(|_| number.is_some_and(f64::is_finite));
                 number
@@ -105,6 +109,19 @@ impl Numbers {
 
 fn with_comma(cell: &str) -> Option<f64> {
     if cell.contains(',') && !cell.contains('.') { parse(&cell.replace(',', ".")) } else { whole(cell) }
+}
+
+/// True for one to three digits that do not begin with 0, a comma and three digits.
+pub(super) fn may_be_thousands(cell: &str) -> bool {
+    let digits = cell.trim_start_matches(['-', '+']).split_once(',');
+    digits.is_some_and(|(before, after)| {
+        let are_digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+        (1..=3).contains(&before.len())
+            && after.len() == 3
+            && are_digits(before)
+            && are_digits(after)
+            && !before.starts_with('0')
+    })
 }
 
 /// A number without decimals.
@@ -155,7 +172,8 @@ mod tests {
     #[test]
     fn the_first_decimal_mark_is_that_of_all_cells() {
         assert_eq!(read(&["1", "0,5", "-2,25e3", "7"]), [Some(1.0), Some(0.5), Some(-2250.0), Some(7.0)]);
-        assert_eq!(read(&["0,5", "0.5"]), [Some(0.5), None]);
+        assert_eq!(read(&["0,5", "0.5", "1,046"]), [Some(0.5), None, Some(1.046)]);
+        assert_eq!(read(&["703", "1,046", "-12,345"]), [Some(703.0), None, None]);
         assert_eq!(read(&["0.5", "0,5", "+1E3"]), [Some(0.5), None, Some(1000.0)]);
         assert_eq!(read(&["1.234,5", "1,234.5", "1,2,3"]), [None, None, None]);
     }

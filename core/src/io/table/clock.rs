@@ -46,7 +46,7 @@ impl Unsteady {
         match self {
             Self::Coarse { digit, step } => format!(
                 "the last digit of its time is {}, which does not show the step of about {}; write more digits, or state \
-                 that no column is the time and which ones are channels (--time-column none --columns 2)",
+                 that no column is the time and which ones are channels (--time-column none, and --columns with theirs)",
                 time(digit),
                 time(step)
             ),
@@ -54,13 +54,13 @@ impl Unsteady {
                 "it has the time of the line before; leave out what was written twice".to_owned()
             }
             Self::Back { by } => format!(
-                "its time is {} before that of the line before, so the lines are not sorted; sort the lines by their times",
+                "its time is {} before that of the line before, so the lines are not sorted; sort them, or cut the table where a new recording or day begins",
                 time(by)
             ),
             Self::Uneven { step, usual, least, most, digit } => format!(
                 "the times are not evenly spaced: the step to this line is {} where {} is due, steps lie between {} and \
                  {}, and the last digit is {}; hybank merge takes samples at their own times, or, if they are even in \
-                 truth, state that no column is the time (--time-column none --columns 2)",
+                 truth, state that no column is the time (--time-column none, and --columns with theirs)",
                 time(step),
                 time(usual),
                 time(least),

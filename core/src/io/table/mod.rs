@@ -202,6 +202,15 @@ impl<R: Read> Table<R> {
     /// [`IoError::Malformed`] with the line and the column.
     pub fn number(&mut self, column: usize) -> Result<f64, IoError> {
         self.numbers.read(self.cells.get(column)).ok_or_else(|| {
+            let cell = self.cells.get(column);
+            if self.numbers.decimal.is_none() && cells::may_be_thousands(cell) {
+                return self.fault(&format!(
+                    "column {}: \"{}\" may be a decimal or hold a thousands separator; state that decimals have a comma, \
+                     or leave the separators out",
+                    column + 1,
+                    Quoted(cell)
+                ));
+            }
             let mark = match self.numbers.decimal {
                 Some(Decimal::Comma) => "decimals have a comma in this table",
                 _ => "decimals have a point",

@@ -20,6 +20,13 @@ pub struct TableOptions {
     pub is_rate_known: bool,
 }
 
+impl TableOptions {
+    /// The same, with the columns left to the table.
+    pub(super) fn without_columns(&self) -> Self {
+        Self { columns: Vec::new(), time: TimeColumn::Found, ..self.clone() }
+    }
+}
+
 /// A column of a table. It reads from its number, counted from 1, or its heading.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Column {

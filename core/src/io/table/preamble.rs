@@ -1,6 +1,6 @@
 //! Finds the first line of numbers, and what the lines before it say.
 
-use super::cells::{Cells, Numbers};
+use super::cells::{Cells, Numbers, may_be_thousands};
 use super::headings::{self, StatedRate};
 use super::options::{Column, Decimal, Delimiter, TableOptions, TimeColumn};
 use super::stamp::Stamp;
@@ -12,6 +12,8 @@ use std::io::Read;
 
 /// Most lines before the first one of numbers.
 const MOST_LINES: usize = 1000;
+/// Lines above the first one of numbers in which headings are looked for.
+const HEADINGS_ABOVE: usize = 4;
 /// Most lines of a table of headings alone.
 const HEADINGS: usize = 2;
 
@@ -58,6 +60,9 @@ impl Preamble {
             let line = line.to_vec();
             let line = (lines.number, line);
             let Some(layout) = layout_of(&line.1, &skipped, options) else {
+                if layout_of(&line.1, &skipped, &options.without_columns()).is_some() {
+                    return Err(lines.fault(&not_there(&skipped, options)));
+                }
                 skipped.push(line);
                 if skipped.len() == MOST_LINES {
                     return Err(lines.fault(&no_numbers(skipped.len(), options)));
@@ -137,6 +142,17 @@ fn no_numbers(lines: usize, options: &TableOptions) -> String {
     )
 }
 
+/// What is said of columns that are not there.
+fn not_there(before: &[NumberedLine], options: &TableOptions) -> String {
+    let time = if let TimeColumn::Is(column) = &options.time { Some(column) } else { None };
+    let asked: Vec<String> = options.columns.iter().chain(time).map(Column::to_string).collect();
+    let headings = before.last().map_or_else(
+        || "it has no headings".to_owned(),
+        |(_, line)| format!("its headings are \"{}\"", Quoted(String::from_utf8_lossy(line).trim())),
+    );
+    format!("not all of the columns {} are there, or hold numbers; {headings}", Quoted(asked.join(", ")))
+}
+
 fn is_name(column: &Column) -> bool {
     matches!(column, Column::Name(_))
 }
@@ -155,7 +171,8 @@ fn layout_of(line: &[u8], before: &[NumberedLine], options: &TableOptions) -> Op
     let with_commas = options.decimal == Some(Decimal::Comma);
     let may_be = |delimiter: &Delimiter| match options.delimiter {
         Some(given) => *delimiter == given,
-        None => !(with_commas && *delimiter == Delimiter::Comma),
+        // Cells in quotes may hold commas beside those that separate them.
+        None => !with_commas || *delimiter != Delimiter::Comma || line.contains(&b'"'),
     };
     let single = if with_commas { Delimiter::Semicolon } else { Delimiter::Comma };
     let several = |delimiter: &Delimiter| split(line, *delimiter).len() > 1;
@@ -171,7 +188,7 @@ impl Layout {
     fn resolve(delimiter: Delimiter, before: &[NumberedLine], options: &TableOptions) -> Option<Self> {
         let place = |column: &Column| match column {
             Column::Number(number) => Some(*number),
-            Column::Name(name) => before.iter().rev().find_map(|(_, line)| {
+            Column::Name(name) => before.iter().rev().take(HEADINGS_ABOVE).find_map(|(_, line)| {
                 split(line, delimiter).iter().position(|cell| cell.eq_ignore_ascii_case(name))
             }),
         };
@@ -185,6 +202,9 @@ impl Layout {
 
     /// True for cells that are numbers, one at least, where samples are; the time may be a date.
     fn is_row(&self, cells: &[String], options: &TableOptions) -> bool {
+        if self.time.is_some_and(|time| time >= cells.len()) {
+            return false;
+        }
         let time = self.time.unwrap_or(0);
         let may_be_date = options.time != TimeColumn::None;
         let columns: Vec<usize> = match self.chosen.as_slice() {
@@ -199,8 +219,10 @@ impl Layout {
                 return true;
             }
             let number = numbers.read(cell);
-            count += usize::from(number.is_some_and(f64::is_finite));
-            number.is_some()
+            // Whether a comma separates thousands is asked where the number is read.
+            let is_number = number.is_some_and(f64::is_finite) || may_be_thousands(cell);
+            count += usize::from(is_number);
+            is_number || number.is_some()
         };
         columns.iter().all(&mut is_held) && count > 0
     }

@@ -18,6 +18,8 @@ struct Decoded<R> {
     /// Text that is ready, and how much of it was given.
     ready: String,
     given: usize,
+    /// The decoder has come to the end.
+    is_over: bool,
 }
 
 enum Encoding {
@@ -75,17 +77,15 @@ impl<R: Read> Read for Decoded<R> {
             }
             Encoding::Utf16(decoder) => decoder,
         };
-        while self.given == self.ready.len() {
+        while self.given == self.ready.len() && !self.is_over {
             self.ready.clear();
             self.given = 0;
             let mut raw = [0; DECODED];
             let count = self.inner.read(&mut raw)?;
             // What is no text becomes the replacement character, which is in no number.
             self.ready.reserve(decoder.max_utf8_buffer_length(count).unwrap_or(4 * DECODED));
-            let _ = decoder.decode_to_string(&raw[..count], &mut self.ready, count == 0);
-            if count == 0 {
-                break;
-            }
+            self.is_over = count == 0;
+            let _ = decoder.decode_to_string(&raw[..count], &mut self.ready, self.is_over);
         }
         let count = (&self.ready.as_bytes()[self.given..]).read(bytes)?;
         self.given += count;
@@ -107,7 +107,8 @@ impl<R: Read> Lines<R> {
     /// Of a file that is called `file` in messages, and should be of this kind. `buffer` bytes are read at a
     /// time.
     pub(super) fn new(inner: R, file: &str, kind: &'static str, buffer: usize) -> Self {
-        let decoded = Decoded { inner, encoding: Encoding::Unknown, ready: String::new(), given: 0 };
+        let decoded =
+            Decoded { inner, encoding: Encoding::Unknown, ready: String::new(), given: 0, is_over: false };
         let reader = BufReader::with_capacity(buffer, decoded);
         Self { reader, file: file.to_owned(), kind, number: 0, line: Vec::new() }
     }

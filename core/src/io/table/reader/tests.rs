@@ -444,3 +444,31 @@ proptest! {
         prop_assert_eq!(bits(&read.samples), bits(&rows.concat()));
     }
 }
+
+#[test]
+fn thousands_are_asked_about_and_columns_that_are_not_there_are_named() {
+    let thousands = "a,b\n\"703\",\"1,046\"\n\"12\",\"999\"\n";
+    assert!(
+        refusal(thousands).contains("line 2: column 2: \"1,046\" may be a decimal"),
+        "{}",
+        refusal(thousands)
+    );
+    let comma = TableOptions { decimal: Some(Decimal::Comma), ..TableOptions::default() };
+    assert_eq!(read_with(thousands, &comma).unwrap().samples, [703.0, 1.046, 12.0, 999.0]);
+    let table = "left,right\n".to_owned() + &lines(3000, |k| format!("{k},0.5"));
+    for options in [
+        TableOptions { columns: vec![Column::Name("middle".into())], ..TableOptions::default() },
+        TableOptions { time: TimeColumn::Is(Column::Number(8)), ..TableOptions::default() },
+    ] {
+        let refused = read_with(&table, &options).err().unwrap();
+        assert!(
+            refused.contains("line 2: not all of the columns") && refused.contains("left,right"),
+            "{refused}"
+        );
+    }
+    // A UTF-16 text that ends inside a character.
+    let mut cut: Vec<u8> = "1,2\n3,4\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    cut.pop();
+    let _ = read(&cut);
+    let _ = read([&cut[..], b"\n"].concat());
+}
