@@ -11,7 +11,7 @@ fuzz_target!(|text: &str| {
     match parse(text, path) {
         Ok(spec) if text.contains("..") || text.contains('/') => drop(spec),
         Ok(spec) => {
-            let missing = load(&spec, path, &LoadOptions::default(), &|_| ()).expect_err("no file");
+            let missing = load(&spec, path, &LoadOptions::default()).expect_err("no file");
             assert!(!missing.to_string().is_empty());
         }
         Err(error) => assert!(error.to_string().contains("fuzz.toml")),
