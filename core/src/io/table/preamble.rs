@@ -75,6 +75,9 @@ impl Preamble {
                 && let Some(next) = lines.next()?.map(<[u8]>::to_vec)
             {
                 let is_headings = is_headings(&next, &ahead[0].1, layout.delimiter);
+                if skipped.is_empty() && is_numbering(&ahead[0].1, &next, layout.delimiter) {
+                    skipped.extend(ahead.pop_front());
+                }
                 ahead.push_back((lines.number, next));
                 if is_headings {
                     skipped.extend(ahead);
@@ -237,6 +240,17 @@ fn is_headings(line: &[u8], before: &[u8], delimiter: Delimiter) -> bool {
     let is_word =
         |cell: &String| Numbers { decimal: None }.read(cell).is_none() && Stamp::parse(cell).is_none();
     cells.len() != split(before, delimiter).len() && cells.iter().all(is_word)
+}
+
+/// True for a line 0, 1, 2, .. of as many columns, two at least, above one with decimals: headings of a program
+/// that has no others.
+fn is_numbering(line: &[u8], next: &[u8], delimiter: Delimiter) -> bool {
+    let (cells, below) = (split(line, delimiter), split(next, delimiter));
+    let are_numbers = cells.iter().enumerate().all(|(column, cell)| *cell == column.to_string());
+    are_numbers
+        && cells.len() > 1
+        && cells.len() == below.len()
+        && below.iter().all(|cell| cell.contains('.'))
 }
 
 /// True for a line with numbers where `first` has them, and words where it has nothing: the preamble stands

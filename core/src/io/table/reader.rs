@@ -17,6 +17,8 @@ const BLOCK_FRAMES: usize = 1024;
 const LOOKED_AT: usize = 1 << 16;
 /// Bytes that are read at a time: those of [`LOOKED_AT`] lines in a file, or what has come through a pipe.
 const BUFFER: usize = LOOKED_AT * 64;
+/// A first column that rises in so many lines is no signal.
+const LIKELY_TIMES: usize = 256;
 /// Share of the lines of a ramp that may be missing.
 const MISSING_IN_RAMP: f64 = 0.1;
 /// Relative difference from which on a rate in the preamble contradicts the times.
@@ -166,7 +168,16 @@ impl<R: Read> TableReader<R> {
         if lines < time.least_lines() {
             return Ok(());
         }
-        let Ok((clock, missing)) = Clock::of(&time.stamps) else { return Ok(()) };
+        let (clock, missing) = match Clock::of(&time.stamps) {
+            Ok(found) => found,
+            Err(_) if lines >= LIKELY_TIMES && time.stamps.is_sorted_by(|a, b| a.value() < b.value()) => {
+                return Err(self.table.fault(
+                    "its first column rises in every line so far, but not evenly: say whether it holds the times \
+                     (--time-column 1) or is a channel (--time-column none)",
+                ));
+            }
+            Err(_) => return Ok(()),
+        };
         if missing.iter().sum::<u64>() as f64 > MISSING_IN_RAMP * lines as f64 {
             return Ok(());
         }

@@ -138,8 +138,13 @@ impl<R: Read> Lines<R> {
             }
             self.decode_as_utf8();
             if !self.line.trim_ascii().is_empty() {
-                let end = self.line.iter().rposition(|byte| !matches!(byte, b'\r' | b'\n'));
-                return Ok(Some(&self.line[..=end.unwrap_or(0)]));
+                let end = self.line.iter().rposition(|byte| !matches!(byte, b'\r' | b'\n')).unwrap_or(0);
+                if self.line[..end].contains(&b'\r') {
+                    return Err(
+                        self.fault("its lines end with a carriage return alone; save them with line feeds")
+                    );
+                }
+                return Ok(Some(&self.line[..=end]));
             }
         }
     }

@@ -472,3 +472,16 @@ fn thousands_are_asked_about_and_columns_that_are_not_there_are_named() {
     let _ = read(&cut);
     let _ = read([&cut[..], b"\n"].concat());
 }
+
+#[test]
+fn numbered_columns_uneven_times_without_a_name_and_carriage_returns_are_seen() {
+    let found = read("0,1\n0.5,-0.25\n0.125,1.0\n").unwrap();
+    assert_eq!(found.samples, [0.5, -0.25, 0.125, 1.0]);
+    assert_eq!(read("0,1\n2,3\n").unwrap().samples, [0.0, 1.0, 2.0, 3.0]);
+    let jitter = |k: u32| format!("{:.6},{:.3}", f64::from(k) * 1e-3 + 3e-4 * f64::from(k * k % 7), 0.5);
+    let uneven = "Zeit,x\n".to_owned() + &lines(300, jitter);
+    assert!(refusal(&uneven).contains("rises in every line so far"), "{}", refusal(&uneven));
+    let channel = TableOptions { time: TimeColumn::None, ..TableOptions::default() };
+    assert_eq!(read_with(&uneven, &channel).unwrap().channels, 2);
+    assert!(refusal("1,2\r3,4\r").contains("carriage return"));
+}
