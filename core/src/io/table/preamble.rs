@@ -242,8 +242,8 @@ fn is_headings(line: &[u8], before: &[u8], delimiter: Delimiter) -> bool {
     cells.len() != split(before, delimiter).len() && cells.iter().all(is_word)
 }
 
-/// True for a line 0, 1, 2, .. of as many columns, two at least, above one with decimals: headings of a program
-/// that has no others.
+/// True for a line 0, 1, 2, .. of as many columns, two at least, above one with decimals: headings of a
+/// program that has no others.
 fn is_numbering(line: &[u8], next: &[u8], delimiter: Delimiter) -> bool {
     let (cells, below) = (split(line, delimiter), split(next, delimiter));
     let are_numbers = cells.iter().enumerate().all(|(column, cell)| *cell == column.to_string());
