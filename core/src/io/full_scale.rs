@@ -12,6 +12,8 @@ use std::f64::consts::FRAC_2_PI;
 
 /// A quiet signal leaves one or two bits of its converter unused; more are unusual enough to be said.
 const UNUSED_BITS: u32 = 3;
+/// Numbers that are compared side by side.
+const LANES: usize = 16;
 /// Fewer codes do not tell which bits a converter has.
 const ENOUGH_CODES: u64 = 256;
 /// So many times as often as a sine of full scale does a signal that is clipped reach the ends of the range.
@@ -186,7 +188,9 @@ impl Scaling {
     pub(super) fn take(&mut self, block: &mut Block, first: usize) -> Result<(), String> {
         let begin = first * block.channels();
         match (self.word, self.scale) {
-            (Some(word), None) if self.is_open => self.codes.take(block, begin, word),
+            (Some(word), None) if self.is_open && self.codes.may_leave_bits(word) => {
+                self.codes.take(block, begin, word);
+            }
             (_, None) => {}
             (Some(word), Some(scale @ (FullScale::Signed(bits) | FullScale::Unsigned(bits)))) => {
                 self.codes.take(block, begin, word);
@@ -327,6 +331,12 @@ impl Codes {
         }
     }
 
+    /// As long as no code uses as many bits as the word has, but for a few.
+    fn may_leave_bits(self, word: Word) -> bool {
+        let reach = 1i64 << (word.bits - UNUSED_BITS);
+        word.is_unsigned || (self.least >= -reach && self.most < reach)
+    }
+
     /// All are multiples of 2^`bits`.
     fn are_multiples(self, bits: u32) -> bool {
         self.used.trailing_zeros() >= bits
@@ -370,15 +380,11 @@ impl Seen {
 
     fn take_numbers<T: Sample>(&mut self, numbers: &[T]) {
         let (low, high) = (T::from_f64(self.rails.0), T::from_f64(self.rails.1));
-        let zero = T::from_f64(0.0);
-        // Comparisons leave NaN out.
-        let mut least = numbers.iter().fold(zero, |least, &x| if x < least { x } else { least });
-        let mut most = numbers.iter().fold(zero, |most, &x| if x > most { x } else { most });
+        let (mut least, mut most) = extremes(numbers);
         if least <= low || most >= high {
             let finite = || numbers.iter().copied().filter(|x| x.to_f64().is_finite());
             self.at_rails += finite().filter(|x| *x <= low || *x >= high).count() as u64;
-            least = finite().fold(zero, |least, x| if x < least { x } else { least });
-            most = finite().fold(zero, |most, x| if x > most { x } else { most });
+            (least, most) = extremes(&finite().collect::<Vec<T>>());
         }
         self.least = self.least.min(least.to_f64());
         self.most = self.most.max(most.to_f64());
@@ -386,6 +392,20 @@ impl Seen {
         let is_whole = |x: &T| x.to_f64().fract() == 0.0 || x.to_f64().is_nan();
         self.are_whole = self.are_whole && numbers.iter().all(is_whole);
     }
+}
+
+/// The least and the most of some numbers and 0, without NaN: lane by lane, which vectors do at once.
+fn extremes<T: Sample>(numbers: &[T]) -> (T, T) {
+    let zero = T::from_f64(0.0);
+    let (mut least, mut most) = ([zero; LANES], [zero; LANES]);
+    for chunk in numbers.chunks(LANES) {
+        for ((least, most), &x) in least.iter_mut().zip(&mut most).zip(chunk) {
+            *least = if x < *least { x } else { *least };
+            *most = if x > *most { x } else { *most };
+        }
+    }
+    let least = least.into_iter().fold(zero, |a, b| if b < a { b } else { a });
+    (least, most.into_iter().fold(zero, |a, b| if b > a { b } else { a }))
 }
 
 #[cfg(test)]
