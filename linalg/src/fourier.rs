@@ -1,20 +1,34 @@
 //! Discrete Fourier transforms of any length.
 
 use crate::Complex;
-use realfft::RealFftPlanner;
+use realfft::{RealFftPlanner, RealToComplex};
 use rustfft::FftPlanner;
+use std::cell::RefCell;
+use std::sync::Arc;
 
 /// X_k = sum_n x_n e^{-2 pi j k n / L} for k = 0 ..= L/2, of L real samples; one zero for none.
 pub fn real_spectrum(samples: &[f64]) -> Vec<Complex<f64>> {
     let mut spectrum = vec![Complex::ZERO; samples.len() / 2 + 1];
     if !samples.is_empty() {
-        let transform = RealFftPlanner::new().plan_fft_forward(samples.len());
+        let transform = real_transform(samples.len());
         // The lengths fit by construction, which is all that this call can object to.
         if transform.process(&mut samples.to_vec(), &mut spectrum).is_err() {
             spectrum.fill(Complex::ZERO);
         }
     }
     spectrum
+}
+
+/// The transform of L real samples. Each thread keeps its last one: channels are as long as each other.
+fn real_transform(length: usize) -> Arc<dyn RealToComplex<f64>> {
+    thread_local! {
+        static LAST: RefCell<Option<Arc<dyn RealToComplex<f64>>>> = const { RefCell::new(None) };
+    }
+    LAST.with_borrow_mut(|last| {
+        let kept = last.take().filter(|kept| kept.len() == length);
+        let transform = kept.unwrap_or_else(|| RealFftPlanner::new().plan_fft_forward(length));
+        Arc::clone(last.insert(transform))
+    })
 }
 
 /// X_k = sum_n x_n e^{-2 pi j k n / L} for k = 0 .. L - 1, of L complex samples.
