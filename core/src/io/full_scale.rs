@@ -4,6 +4,9 @@
 //! 2047. They stand in the low bits of the word, or in the high ones where all codes are multiples of 16;
 //! the first codes other than 0 tell which. Words that count from 0 hold codes that count from 0.
 
+mod seen;
+
+use self::seen::{Codes, Seen};
 use super::block::{Block, Numbers, with_numbers};
 use super::{InputFault, StreamHeader};
 use crate::quantity::FullScale;
@@ -12,15 +15,13 @@ use std::f64::consts::FRAC_2_PI;
 
 /// A quiet signal leaves one or two bits of its converter unused; more are unusual enough to be said.
 const UNUSED_BITS: u32 = 3;
-/// Numbers that are compared side by side.
-const LANES: usize = 16;
 /// Fewer codes do not tell which bits a converter has.
 const ENOUGH_CODES: u64 = 256;
 /// So many times as often as a sine of full scale does a signal that is clipped reach the ends of the range.
 const CLIPPED_FACTOR: f64 = 2.0;
 /// As many samples may be there by chance in a short recording.
 const FEW_AT_RAILS: f64 = 16.0;
-/// Floats of streams have full scale 1 by convention, and may exceed it; nobody means so many times as much.
+/// Floats of streams have full scale 1 by convention and may exceed it; a peak of this size is a mistake.
 const WILD_PEAK: f64 = 1e3;
 
 /// What is stated of the full scale of inputs.
@@ -128,7 +129,7 @@ pub(super) struct Scaling {
     scale: Option<FullScale>,
     /// Codes beyond the full scale are an error.
     is_binding: bool,
-    /// Nobody states the full scale of integers.
+    /// The full scale of integers is not stated.
     is_open: bool,
     /// Floats beyond it are said.
     usual_peak: f64,
@@ -148,20 +149,18 @@ impl Scaling {
         let found = stated.of(header);
         let scale = found.map(|(scale, _)| header.word.map_or(scale, |word| word.codes(scale)));
         let is_binding = found.is_some_and(|(_, is_binding)| is_binding);
-        let too_wide = |scale: FullScale, word: Word| match scale {
-            FullScale::Signed(bits) | FullScale::Unsigned(bits) => bits > word.bits,
-            FullScale::Number(_) => false,
-        };
-        let is_too_wide = scale.zip(header.word).is_some_and(|(scale, word)| too_wide(scale, word));
-        let scale = scale.filter(|_| is_binding || !is_too_wide);
-        if let (Some(word), Some(FullScale::Signed(bits) | FullScale::Unsigned(bits))) = (header.word, scale)
-            && bits > word.bits
-        {
+        let bits = scale.and_then(|scale| match scale {
+            FullScale::Signed(bits) | FullScale::Unsigned(bits) => Some(bits),
+            FullScale::Number(_) => None,
+        });
+        let too_wide = bits.zip(header.word).filter(|(bits, word)| *bits > word.bits);
+        if let Some((bits, word)) = too_wide.filter(|_| is_binding) {
             return Err(format!(
                 "codes of {bits} bits do not fit its words of {} bits; state fewer",
                 word.bits
             ));
         }
+        let scale = scale.filter(|_| too_wide.is_none());
         Ok(Self {
             word: header.word,
             scale,
@@ -215,8 +214,8 @@ impl Scaling {
         Ok(())
     }
 
-    /// Decides where codes stand, `spare` bits fewer than their words have. Codes beyond those that are
-    /// stated, where that binds nobody, are codes of the whole word.
+    /// Decides where codes stand, `spare` bits fewer than their words have. If codes exceed a full scale that
+    /// is not binding, they are codes of the whole word.
     fn choose(&mut self, word: Word, scale: FullScale, spare: u32) {
         let (middle, amplitude) = (scale.middle() - word.middle(), scale.amplitude());
         let is_within =
@@ -307,105 +306,6 @@ fn apply(block: &mut Block, begin: usize, unit: f64, middle: f64, amplitude: f64
             numbers[begin..].iter_mut().for_each(|x| *x = Sample::from_f64((x.to_f64() * unit - middle) / amplitude));
         });
     }
-}
-
-/// The codes of words so far, from the middle of their range.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Codes {
-    least: i64,
-    most: i64,
-    /// The bits that any of them has.
-    used: u64,
-}
-
-impl Codes {
-    const NONE: Self = Self { least: i64::MAX, most: i64::MIN, used: 0 };
-
-    fn take(&mut self, block: &Block, begin: usize, word: Word) {
-        let unit = word.amplitude();
-        for part in &block.parts {
-            with_numbers!(part, numbers => for x in &numbers[begin..] {
-                let code = (x.to_f64() * unit) as i64;
-                *self = Self { least: self.least.min(code), most: self.most.max(code), used: self.used | code as u64 };
-            });
-        }
-    }
-
-    /// As long as no code uses as many bits as the word has, but for a few.
-    fn may_leave_bits(self, word: Word) -> bool {
-        let reach = 1i64 << (word.bits - UNUSED_BITS);
-        word.is_unsigned || (self.least >= -reach && self.most < reach)
-    }
-
-    /// All are multiples of 2^`bits`.
-    fn are_multiples(self, bits: u32) -> bool {
-        self.used.trailing_zeros() >= bits
-    }
-
-    /// That steps of one use far fewer bits than the word has.
-    fn unused(self, word: Word) -> Option<InputFault> {
-        let middle = word.middle();
-        let likely = FullScale::of_codes(self.least as f64 + middle, self.most as f64 + middle)?;
-        let (FullScale::Signed(bits) | FullScale::Unsigned(bits)) = likely else { return None };
-        let is_odd = !self.are_multiples(1) && word.bits.saturating_sub(bits) >= UNUSED_BITS;
-        is_odd.then_some(InputFault::UnusedBits { bits: word.bits, likely })
-    }
-}
-
-/// The samples so far, of full scale.
-#[derive(Debug, Clone, Copy)]
-struct Seen {
-    least: f64,
-    most: f64,
-    are_whole: bool,
-    count: u64,
-    rails: (f64, f64),
-    at_rails: u64,
-}
-
-impl Seen {
-    /// None, of a converter with these rails; floats clip at full scale.
-    fn new(rails: Option<(f64, f64)>) -> Self {
-        let rails = rails.unwrap_or((-1.0, 1.0));
-        Self { least: 0.0, most: 0.0, are_whole: true, count: 0, rails, at_rails: 0 }
-    }
-
-    fn peak(&self) -> f64 {
-        self.most.max(-self.least)
-    }
-
-    fn take(&mut self, part: &Numbers, begin: usize) {
-        with_numbers!(part, numbers => self.take_numbers(&numbers[begin..]));
-    }
-
-    fn take_numbers<T: Sample>(&mut self, numbers: &[T]) {
-        let (low, high) = (T::from_f64(self.rails.0), T::from_f64(self.rails.1));
-        let (mut least, mut most) = extremes(numbers);
-        if least <= low || most >= high {
-            let finite = || numbers.iter().copied().filter(|x| x.to_f64().is_finite());
-            self.at_rails += finite().filter(|x| *x <= low || *x >= high).count() as u64;
-            (least, most) = extremes(&finite().collect::<Vec<T>>());
-        }
-        self.least = self.least.min(least.to_f64());
-        self.most = self.most.max(most.to_f64());
-        self.count += numbers.len() as u64;
-        let is_whole = |x: &T| x.to_f64().fract() == 0.0 || x.to_f64().is_nan();
-        self.are_whole = self.are_whole && numbers.iter().all(is_whole);
-    }
-}
-
-/// The least and the most of some numbers and 0, without NaN: lane by lane, which vectors do at once.
-fn extremes<T: Sample>(numbers: &[T]) -> (T, T) {
-    let zero = T::from_f64(0.0);
-    let (mut least, mut most) = ([zero; LANES], [zero; LANES]);
-    for chunk in numbers.chunks(LANES) {
-        for ((least, most), &x) in least.iter_mut().zip(&mut most).zip(chunk) {
-            *least = if x < *least { x } else { *least };
-            *most = if x > *most { x } else { *most };
-        }
-    }
-    let least = least.into_iter().fold(zero, |a, b| if b < a { b } else { a });
-    (least, most.into_iter().fold(zero, |a, b| if b > a { b } else { a }))
 }
 
 #[cfg(test)]
