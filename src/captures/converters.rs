@@ -93,7 +93,7 @@ impl Converters<'_> {
     /// What is stated of the full scale of the converters, by the user and by the spec.
     pub fn scale(&self, given: Option<FullScale>) -> StatedScale {
         let spec = self.spec();
-        // Converters of unequal bits are told apart by no file.
+        // No file says which converter has which number of bits.
         let bits = spec.and_then(|spec| spec.channels.first()?.bits);
         let bits = bits.filter(|_| spec.is_some_and(|spec| spec.channels.iter().all(|one| one.bits == bits)));
         StatedScale { given, of_spec: spec.and_then(|spec| spec.full_scale), bits }

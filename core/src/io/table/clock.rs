@@ -59,8 +59,9 @@ impl Unsteady {
             ),
             Self::Uneven { step, usual, least, most, digit } => format!(
                 "the times are not evenly spaced: the step to this line is {} where {} is due, steps lie between {} and \
-                 {}, and the last digit is {}; hybank merge takes samples at their own times, or, if they are even in \
-                 truth, state that no column is the time (--time-column none, and --columns with theirs)",
+                 {}, and the last digit is {}; fuse --stamps and hybank merge take \
+                 samples at their own times; if they are even in truth, state that no column is the time (--time-column \
+                 none, and --columns with theirs)",
                 time(step),
                 time(usual),
                 time(least),
