@@ -214,8 +214,8 @@ impl Scaling {
         Ok(())
     }
 
-    /// Decides where codes stand, `spare` bits fewer than their words have. If codes exceed a full scale that
-    /// is not binding, they are codes of the whole word.
+    /// Decides where codes stand, `spare` bits fewer than their words have. If codes exceed a full scale
+    /// that is not binding, they are codes of the whole word.
     fn choose(&mut self, word: Word, scale: FullScale, spare: u32) {
         let (middle, amplitude) = (scale.middle() - word.middle(), scale.amplitude());
         let is_within =
