@@ -328,6 +328,39 @@ mod tests {
         }
     }
 
+    /// Two tones of two converters, rounded to so many bits of full scale.
+    fn two_tones([a, b]: [f64; 2], bits: i32) -> [Vec<f64>; 2] {
+        let unit = 2_f64.powi(bits - 1);
+        [1.2, 0.6].map(|late| {
+            let t = |k: i32| (2.0 * f64::from(k) - late) / 48e3;
+            let x = |t: f64| 0.4 * (TAU * a * t + 0.1).sin() + 0.3 * (TAU * b * t + 0.7).sin();
+            (0..16_384).map(|k| (unit * x(t(k))).round() / unit).collect()
+        })
+    }
+
+    #[test]
+    fn the_verdict_on_two_tones_does_not_depend_on_their_noise() {
+        for tones in [[997.0, 3500.0], [440.0, 8000.0], [1000.0, 1300.0]] {
+            for bits in [12, 20, 21, 22, 50] {
+                let verdict = found(&two_tones(tones, bits)).verdict;
+                assert!(
+                    matches!(verdict, Verdict::Explained(share) if share > 1.0 - 1e-6),
+                    "{tones:?} {bits}: {verdict}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn an_inverted_channel_of_two_tones_is_not_said_to_be_another_one() {
+        for tones in [[997.0, 3500.0], [440.0, 8000.0], [1000.0, 1300.0]] {
+            let [first, mut second] = two_tones(tones, 16);
+            second.iter_mut().for_each(|x| *x = -*x);
+            let found = found(&[first, second]).contradictions;
+            assert!(matches!(found[..], [Contradiction::Inverted { channel: 2 }]), "{tones:?} {found:?}");
+        }
+    }
+
     #[test]
     fn starts_are_recognised_from_one_sample_to_seconds() {
         let mut dice = Random(52);

@@ -73,7 +73,9 @@ pub(super) fn delays_told(spec: &Spec, model: &ChannelModel, records: &[Record])
         return Delays::in_order(order);
     }
     let fit = FittedValues { delay: true, gain: true, offset: false, cutoff: None };
-    let Ok(fitted) = blind.fit(CalibrationSettings { fit, reference }) else { return Delays::default() };
+    let Ok(fitted) = blind.fit(CalibrationSettings { fit, reference }) else {
+        return Delays { are_told: blind.tells_delays(SHARP_SIGMA), ..Delays::default() };
+    };
     let (nominal, found) = blind.unexplained(&fitted.point);
     let fits = fitted.misfit.is_none_or(|misfit| misfit <= WORST_MISFIT);
     let is_clear = fits && found <= CLEARLY_LESS * nominal;
@@ -107,22 +109,24 @@ fn deviations(spec: &Spec, model: &ChannelModel, estimates: &[ChannelEstimate]) 
 }
 
 /// An order of the channels, from 1, that explains bands of one alias, in whatever zone, at least ten times
-/// as well as the given one and clearly better than any other: two channels swapped, all rotated, or
-/// reversed.
+/// as well as the given one and clearly better than any other, and than one inverted channel: two channels
+/// swapped, all rotated, or reversed.
 fn other_order(blind: &Blind<'_>, channels: usize) -> Option<Vec<usize>> {
     let given: Vec<usize> = (0..channels).collect();
     let others = other_orders(&given);
     let bands = blind.single_bands(others.len());
-    let left = unexplained_in_order(&bands, &given);
+    let left = unexplained_in_order(&bands, &given, None);
     // NaN, without bands, says nothing.
     let is_doubtful = left > ORDER_DOUBTFUL;
     if !is_doubtful {
         return None;
     }
-    let weigh = |order: Vec<usize>| (unexplained_in_order(&bands, &order), order);
+    let weigh = |order: Vec<usize>| (unexplained_in_order(&bands, &order, None), order);
     let mut weighed: Vec<_> = others.into_iter().map(weigh).collect();
     weighed.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let second = weighed.get(1).map_or(f64::INFINITY, |(left, _)| *left);
+    let inverted = (0..channels).map(|i| unexplained_in_order(&bands, &given, Some(i)));
+    let second =
+        weighed.get(1).map(|(left, _)| *left).into_iter().chain(inverted).fold(f64::INFINITY, f64::min);
     let (best, order) = weighed.into_iter().next()?;
     (best <= CLEARLY_LESS * left && DISTINCT_ORDER * best <= second).then(|| from_one(order))
 }

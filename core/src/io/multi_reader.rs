@@ -84,8 +84,17 @@ impl MultiReader {
             per_frame: options.samples_per_frame.get(i).copied().unwrap_or(1),
             block,
         };
+        let sources: Vec<InputSource> = paths.iter().enumerate().map(source).collect();
+        if let Some(first) = sources.first()
+            && options.table.is_layout_given()
+            && !sources.iter().any(InputSource::is_table)
+        {
+            let problem =
+                "it is no table, so options of tables (columns, delimiters, lines to skip) do not apply";
+            return Err(IoError::unfit(&first.name())(problem.into()));
+        }
         // All threads first: opening a FIFO waits for its writer, in whatever order they come.
-        let inputs = paths.iter().enumerate().map(|input| Input::on_thread(source(input)));
+        let inputs = sources.into_iter().map(Input::on_thread);
         let inputs = inputs.collect::<Result<_, _>>()?;
         let ReadOptions { until, max_lost, lost, .. } = options;
         let stop = crossbeam_channel::never();

@@ -94,6 +94,10 @@ impl InputSource {
         self.path.as_os_str() == "-"
     }
 
+    pub(super) fn is_table(&self) -> bool {
+        Kind::of(&self.path, self.coding) == Kind::Csv
+    }
+
     /// True for inputs whose floats may be codes of a converter.
     pub(super) fn is_table_or_array(&self) -> bool {
         matches!(Kind::of(&self.path, self.coding), Kind::Csv | Kind::Npy | Kind::Mat)

@@ -62,6 +62,11 @@ struct Occupied {
     aliases: Vec<i32>,
 }
 
+/// Share of the power that is left where captures without noise agree with delays.
+const AGREEING_SHARE: f64 = 1e-6;
+/// A wrong delay leaves so many times as much.
+const CLEARLY_MORE: f64 = 100.0;
+
 /// The data of a blind fit.
 pub(super) struct Blind<'a> {
     model: &'a ChannelModel,
@@ -215,6 +220,30 @@ impl<'a> Blind<'a> {
         let same = at_nominal.filter(|band| used.iter().any(|used| used.band.w == band.w));
         let before = same.map(|band| self.least_over_aliases(|alias| left(&nominal, &band, alias))).sum();
         (before, used.iter().map(|used| left(found, &used.band, used.aliases[0])).sum())
+    }
+
+    /// True if bands of one alias agree with the nominal delays, and would not if any of these were wrong by
+    /// `moved` fast periods. The likelihood of a signal with next to no noise has no maximum that is found.
+    pub(super) fn tells_delays(&self, moved: f64) -> bool {
+        let nominal = self.nominal();
+        let power: f64 = self.bands(&nominal.delays, FIRST_LEAST).iter().map(|used| used.band.power()).sum();
+        let left = self.left_at(&nominal);
+        let mut others = (0..self.model.channels()).flat_map(|i| [(i, -moved), (i, moved)]);
+        left <= AGREEING_SHARE * power
+            && others.all(|(i, moved)| {
+                let mut point = nominal.clone();
+                point.delays[i] += moved;
+                self.left_at(&point) > CLEARLY_MORE * left
+            })
+    }
+
+    /// The power that one alias per band leaves at a point, whichever alias fits a band best.
+    fn left_at(&self, point: &ChannelValues) -> f64 {
+        let left = |used: &Occupied| {
+            let Occupied { band, .. } = used;
+            self.least_over_aliases(|alias| band.unexplained(&self.model.steering(point, band.w, &[alias])))
+        };
+        self.bands(&point.delays, FIRST_LEAST).iter().map(left).sum()
     }
 
     fn nominal(&self) -> ChannelValues {

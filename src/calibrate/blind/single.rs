@@ -51,11 +51,12 @@ impl SingleBand {
         Some(Self { power: band.power(), strength, source, columns })
     }
 
-    /// The power that the best alias leaves if capture i is channel `order[i]`.
-    fn unexplained(&self, order: &[usize]) -> f64 {
+    /// The power that the best alias leaves if capture i is channel `order[i]`, and one is inverted.
+    fn unexplained(&self, order: &[usize], inverted: Option<usize>) -> f64 {
         let explained = |column: &Vec<Complex<f64>>| {
             let along: Complex<f64> = self.source.iter().zip(order).map(|(u, &i)| u * column[i]).sum();
-            along.norm_sqr()
+            let other_sign = inverted.map_or(Complex::default(), |i| self.source[i] * column[order[i]]);
+            (along - 2.0 * other_sign).norm_sqr()
         };
         let best = self.columns.iter().map(explained).fold(0.0, f64::max);
         self.power - self.strength * best
@@ -63,9 +64,14 @@ impl SingleBand {
 }
 
 /// The share of the power that one alias per band leaves unexplained if capture i is channel `order[i]`,
-/// with the nominal values and whichever alias fits a band best. NaN without bands.
-pub(in crate::calibrate) fn unexplained_in_order(bands: &[SingleBand], order: &[usize]) -> f64 {
-    let left: f64 = bands.iter().map(|band| band.unexplained(order)).sum();
+/// with the nominal values and whichever alias fits a band best, and one capture may be inverted. NaN without
+/// bands.
+pub(in crate::calibrate) fn unexplained_in_order(
+    bands: &[SingleBand],
+    order: &[usize],
+    inverted: Option<usize>,
+) -> f64 {
+    let left: f64 = bands.iter().map(|band| band.unexplained(order, inverted)).sum();
     left / bands.iter().map(|band| band.power).sum::<f64>()
 }
 
@@ -91,16 +97,19 @@ mod tests {
         let u = CMat::from_fn(3, 1, |i, _| Complex::new(1.0 + i as f64, 0.3 - i as f64));
         let band = SpectralBand { w, count: 5, matrix: &u * u.adjoint() };
         let delays = &model.delays;
-        let left = |alias: i32| {
+        let left = |alias: i32, inverted: Option<usize>| {
             let column = model.steering(&point, w, &[alias]);
             band.unexplained(&CMat::from_fn(3, 1, |i, _| {
                 let removed = w * (delays[order[i]] - delays[i]) / 4.0;
-                column[(order[i], 0)] * Complex::from_polar(1.0, -removed)
+                let sign = if inverted == Some(i) { -1.0 } else { 1.0 };
+                column[(order[i], 0)] * Complex::from_polar(sign, -removed)
             }))
         };
-        let expected = (-4..=4).map(left).fold(f64::INFINITY, f64::min);
-        let found = SingleBand::new(&model, &point, &band, -4..=4).unwrap().unexplained(&order);
-        assert!((found - expected).abs() < 1e-12 * band.power(), "{found} {expected}");
+        for inverted in [None, Some(1)] {
+            let expected = (-4..=4).map(|alias| left(alias, inverted)).fold(f64::INFINITY, f64::min);
+            let found = SingleBand::new(&model, &point, &band, -4..=4).unwrap().unexplained(&order, inverted);
+            assert!((found - expected).abs() < 1e-12 * band.power(), "{found} {expected}");
+        }
     }
 
     /// 32 channels at ratio 32 have 559 orders, 65 aliases and up to 128 bands: 149 million products.

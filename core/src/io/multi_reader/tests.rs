@@ -3,6 +3,7 @@
 use super::super::block::Block;
 use super::super::frames::Message;
 use super::*;
+use crate::io::table::TableOptions;
 use crate::io::{Coding, InputFault, OfflineSamples, PcmFormat, SampleLayout, StatedScale, TimeInterleaving};
 use crossbeam_channel::Sender;
 
@@ -31,6 +32,21 @@ fn reader(
     let (stop, until) = (crossbeam_channel::never(), Until::Shortest);
     let inputs = vec![input];
     MultiReader { inputs, stop, until, max_lost: 0, origin: 0, ready: 0, consumed: 0 }
+}
+
+#[test]
+fn options_of_tables_are_refused_without_a_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = ["x.raw", "x.csv"].map(|name| folder.path().join(name));
+    paths.iter().for_each(|path| std::fs::write(path, "0.5\n0.5\n").unwrap());
+    let table = TableOptions { skip_lines: 1, ..TableOptions::default() };
+    let read = |paths: &[PathBuf]| {
+        let options = ReadOptions { table: table.clone(), ..raw(1) };
+        MultiReader::start(paths, options, &mut |_| {}).map(|reader| reader.channels())
+    };
+    let refused = read(&paths[..1]).unwrap_err().to_string();
+    assert!(refused.contains("x.raw: it is no table"), "{refused}");
+    assert_eq!(read(&paths).unwrap(), 2);
 }
 
 #[test]

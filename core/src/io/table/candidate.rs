@@ -54,10 +54,10 @@ impl Candidate {
     }
 
     /// Takes the stamp of the next line; false if it shows that the column is a channel.
-    pub(super) fn take<R: Read>(&mut self, table: &Table<R>) -> Result<bool, IoError> {
-        let stamp = Stamp::parse(table.cell(self.column));
-        let Some(stamp) = stamp else {
-            return if self.is_certain { table.stamp(self.column).map(|_| true) } else { Ok(false) };
+    pub(super) fn take<R: Read>(&mut self, table: &mut Table<R>) -> Result<bool, IoError> {
+        let stamp = match table.stamp(self.column) {
+            Ok(stamp) => stamp,
+            Err(error) => return if self.is_certain { Err(error) } else { Ok(false) },
         };
         if stamp.is_date && self.stamps.is_empty() {
             (self.role, self.is_certain) = (Role::Time(None), true);

@@ -84,6 +84,30 @@ const BEGINNINGS: [&str; 2] = ["start", "t0"];
 /// Digits up to which an interval is a round number; those that end in more are rounded.
 const ROUND: i32 = 2;
 
+/// Prefixes of units and the size that they give.
+const PREFIXES: [(&str, &str); 9] = [
+    ("", "1"),
+    ("milli", "m"),
+    ("micro", "µ"),
+    ("kilo", "k"),
+    ("m", "m"),
+    ("µ", "µ"),
+    ("μ", "µ"),
+    ("u", "µ"),
+    ("k", "k"),
+];
+/// Names of units, and what they measure.
+const QUANTITIES: [(&str, &str); 8] = [
+    ("v", "voltage"),
+    ("volt", "voltage"),
+    ("volts", "voltage"),
+    ("a", "current"),
+    ("amp", "current"),
+    ("ampere", "current"),
+    ("amps", "current"),
+    ("amperes", "current"),
+];
+
 /// The unit of time that a text is, in seconds.
 fn unit_of(word: &str) -> Option<f64> {
     UNITS.iter().find(|(known, _)| *known == word).map(|(_, seconds)| *seconds)
@@ -92,6 +116,33 @@ fn unit_of(word: &str) -> Option<f64> {
 fn words(text: &str) -> Vec<String> {
     let text = text.to_lowercase();
     text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_owned).collect()
+}
+
+/// The unit of a signal as it is written: a quantity, and the size that its prefix gives it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Unit {
+    pub(super) quantity: &'static str,
+    pub(super) size: &'static str,
+    pub(super) written: String,
+}
+
+impl Unit {
+    /// Of the cell of a line of units, or of brackets in a heading.
+    pub(super) fn of(heading: &str, below: &str) -> Option<Self> {
+        let in_brackets = |text: &str| {
+            let text = text.trim();
+            let from = text.find(['(', '['])?;
+            text[from + 1..].strip_suffix([')', ']']).map(str::to_owned)
+        };
+        let written = in_brackets(below).or_else(|| in_brackets(heading)).unwrap_or_else(|| below.to_owned());
+        let lower = written.trim().to_lowercase();
+        let of = |&(prefix, size): &(&str, &'static str)| {
+            let quantity = QUANTITIES.iter().find(|(name, _)| lower.strip_prefix(prefix) == Some(name))?.1;
+            Some((quantity, size))
+        };
+        let (quantity, size) = PREFIXES.iter().find_map(of)?;
+        Some(Self { quantity, size, written: written.trim().to_owned() })
+    }
 }
 
 /// What a heading says, with the cell below it where there is a line of units.
@@ -221,6 +272,23 @@ mod tests {
         assert!(is_of_units("(ms)") && is_of_units("Second") && !is_of_units("Label") && !is_of_units("t"));
         assert_eq!(unit_by_size(1.7e9), 1.0);
         assert_eq!([1.7e12, 1.7e15, 1.7e18].map(unit_by_size), [1e-3, 1e-6, 1e-9]);
+    }
+
+    #[test]
+    fn units_are_told_by_quantity_and_size() {
+        let unit = |heading, below| Unit::of(heading, below).map(|unit| (unit.quantity, unit.size));
+        for (heading, below, want) in [
+            ("A", "(mV)", Some(("voltage", "m"))),
+            ("CH1", "Volt", Some(("voltage", "1"))),
+            ("Channel A [V]", "", Some(("voltage", "1"))),
+            ("I (µA)", "", Some(("current", "µ"))),
+            ("I (uA)", "", Some(("current", "µ"))),
+            ("A", "", None),
+            ("left", "right", None),
+            ("T (°C)", "", None),
+        ] {
+            assert_eq!(unit(heading, below), want, "{heading} {below}");
+        }
     }
 
     #[test]

@@ -23,10 +23,10 @@ pub use stamped::{StampedTable, read_stamped};
 use super::IoError;
 use crate::messages::{Quoted, counted};
 use bare_commas::BareCommas;
-use cells::{Cells, Numbers};
-use headings::{Role, StatedRate};
+use cells::{AS_TIME, Cells, Numbers};
+use headings::{Role, StatedRate, Unit};
 use preamble::Preamble;
-use stamp::Stamp;
+use stamp::{Days, Stamp};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -54,6 +54,7 @@ pub struct Table<R> {
     cells: Cells,
     numbers: Numbers,
     bare: Option<BareCommas>,
+    days: Days,
     /// Number of the last line, from 1.
     line: u64,
 }
@@ -79,7 +80,7 @@ impl<R: Read> Table<R> {
         let is_open = delimiter == Delimiter::Comma && options.decimal.is_none();
         let bare = is_open.then(BareCommas::default);
         let (cells, numbers) = (Cells::new(delimiter), Numbers { decimal: options.decimal });
-        Ok(Self { line: lines.number, lines, preamble, cells, numbers, bare })
+        Ok(Self { line: lines.number, lines, preamble, cells, numbers, bare, days: Days::default() })
     }
 
     /// True if a line has come that was not used.
@@ -100,6 +101,11 @@ impl<R: Read> Table<R> {
     /// What the headings say of a column.
     fn role(&self, column: usize) -> Role {
         headings::role(&self.preamble.names[column], &self.preamble.units[column])
+    }
+
+    /// The unit of a column, if its heading or the line of units below says one that is known.
+    fn unit(&self, column: usize) -> Option<Unit> {
+        Unit::of(&self.preamble.names[column], &self.preamble.units[column])
     }
 
     /// The first column that holds something.
@@ -215,22 +221,17 @@ impl<R: Read> Table<R> {
                 Some(Decimal::Comma) => "decimals have a comma in this table",
                 _ => "decimals have a point",
             };
-            self.fault(&format!(
-                "column {}: \"{}\" is no number; {mark}, and cells are separated by , ; tab or space",
-                column + 1,
-                Quoted(self.cells.get(column))
-            ))
+            let separated = format!("{mark}, and cells are separated by , ; tab or space");
+            let remedy = cells::remedy(cell).unwrap_or(&separated);
+            self.fault(&format!("column {}: \"{}\" is no number; {remedy}", column + 1, Quoted(cell)))
         })
     }
 
-    /// The time in a cell of the last line.
-    fn stamp(&self, column: usize) -> Result<Stamp, IoError> {
-        Stamp::parse(self.cells.get(column)).ok_or_else(|| {
-            self.fault(&format!(
-                "column {}: \"{}\" is no time; write a number, or a date as 2026-11-28T10:00:00.125Z",
-                column + 1,
-                Quoted(self.cells.get(column))
-            ))
+    /// The time in a cell of the last line; times of day go on after midnight.
+    fn stamp(&mut self, column: usize) -> Result<Stamp, IoError> {
+        Stamp::parse(self.cells.get(column)).map(|stamp| self.days.count(stamp)).ok_or_else(|| {
+            let cell = self.cells.get(column);
+            self.fault(&format!("column {}: \"{}\" is no time; {AS_TIME}", column + 1, Quoted(cell)))
         })
     }
 

@@ -21,6 +21,11 @@ pub struct TableOptions {
 }
 
 impl TableOptions {
+    /// True if anything of how the table is written was said.
+    pub(in crate::io) fn is_layout_given(&self) -> bool {
+        Self { is_rate_known: false, ..self.clone() } != Self::default()
+    }
+
     /// The same, with the columns left to the table.
     pub(super) fn without_columns(&self) -> Self {
         Self { columns: Vec::new(), time: TimeColumn::Found, ..self.clone() }

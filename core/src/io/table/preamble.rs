@@ -1,6 +1,6 @@
 //! Finds the first line of numbers, and what the lines before it say.
 
-use super::cells::{Cells, Numbers, may_be_thousands};
+use super::cells::{Cells, Numbers, may_be_thousands, remedy};
 use super::headings::{self, StatedRate};
 use super::options::{Column, Decimal, Delimiter, TableOptions, TimeColumn};
 use super::stamp::Stamp;
@@ -65,7 +65,7 @@ impl Preamble {
                 }
                 skipped.push(line);
                 if skipped.len() == MOST_LINES {
-                    return Err(lines.fault(&no_numbers(skipped.len(), options)));
+                    return Err(lines.fault(&no_numbers(&skipped, options)));
                 }
                 continue;
             };
@@ -95,7 +95,7 @@ impl Preamble {
         options: &TableOptions,
     ) -> Result<Self, IoError> {
         if skipped.len() > HEADINGS || options.columns.iter().any(is_name) {
-            return Err(lines.fault(&no_numbers(skipped.len(), options)));
+            return Err(lines.fault(&no_numbers(skipped, options)));
         }
         let Some((_, line)) = skipped.last() else { return Ok(Self::default()) };
         let has = |delimiter: &Delimiter| line.contains(&delimiter.byte());
@@ -131,18 +131,29 @@ impl Preamble {
 }
 
 /// What is said of a table in which no numbers were found.
-fn no_numbers(lines: usize, options: &TableOptions) -> String {
+fn no_numbers(lines: &[NumberedLine], options: &TableOptions) -> String {
     let names: Vec<String> =
         options.columns.iter().filter(|column| is_name(column)).map(Column::to_string).collect();
     let named = match names.as_slice() {
         [] => String::new(),
         names => format!(" in columns called {}", Quoted(names.join(", "))),
     };
-    format!(
-        "no line of numbers{named} among {}; give one column per channel and one line per frame, with cells \
-         separated by , ; tab or space",
-        counted(lines, "line")
-    )
+    let last = lines.last().map_or(&[][..], |(_, line)| line);
+    let cells = Delimiter::ALL.map(|delimiter| split(last, options.delimiter.unwrap_or(delimiter)));
+    let cell = cells
+        .iter()
+        .filter(|cells| cells.len() > 1)
+        .chain(&cells)
+        .flatten()
+        .find_map(|cell| Some((cell, remedy(cell)?)));
+    let remedy = cell.map_or_else(
+        || {
+            "give one column per channel and one line per frame, with cells separated by , ; tab or space"
+                .to_owned()
+        },
+        |(cell, remedy)| format!("the last one has \"{}\": {remedy}", Quoted(cell)),
+    );
+    format!("no line of numbers{named} among {}; {remedy}", counted(lines.len(), "line"))
 }
 
 /// What is said of columns that are not there.

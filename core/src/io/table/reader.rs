@@ -8,6 +8,7 @@ use super::options::TableOptions;
 use crate::io::block::Block;
 use crate::io::capture::Capture;
 use crate::io::{InputFault, IoError, PcmFormat, SampleLayout, StreamHeader};
+use crate::messages::Quoted;
 use std::collections::VecDeque;
 use std::io::{self, Read};
 
@@ -79,6 +80,7 @@ impl<R: Read> TableReader<R> {
         }
         let candidate = Candidate::of(&table, options);
         let channels = table.columns();
+        refuse_mixed_units(&table, &channels)?;
         let header = StreamHeader::real(SampleLayout::packed(PcmFormat::F64Le), channels.len());
         let mut reader = Self {
             table,
@@ -111,7 +113,7 @@ impl<R: Read> TableReader<R> {
                 break;
             }
             candidate = match candidate {
-                Some(mut time) => time.take(&self.table)?.then_some(time),
+                Some(mut time) => time.take(&mut self.table)?.then_some(time),
                 None => None,
             };
             if let Some(Candidate { column, is_certain: true, .. }) = candidate {
@@ -267,6 +269,23 @@ impl<R: Read> TableReader<R> {
         let missing = timed.clock.take(stamp).map_err(|fault| self.table.fault(&fault.message(unit)))?;
         self.all_missing += missing;
         Ok(missing)
+    }
+}
+
+/// Refuses channels of one quantity in units of several sizes, as V beside mV.
+fn refuse_mixed_units<R: Read>(table: &Table<R>, channels: &[usize]) -> Result<(), IoError> {
+    let units = channels.iter().filter_map(|column| Some((column, table.unit(*column)?)));
+    let mut units = units.collect::<Vec<_>>().into_iter();
+    let Some((first, one)) = units.next() else { return Ok(()) };
+    match units.find(|(_, unit)| unit.quantity == one.quantity && unit.size != one.size) {
+        Some((column, unit)) => Err(table.fault(&format!(
+            "column {} is in {} and column {} in {}; write them in one unit, or choose columns (--columns)",
+            first + 1,
+            Quoted(&one.written),
+            column + 1,
+            Quoted(&unit.written)
+        ))),
+        None => Ok(()),
     }
 }
 

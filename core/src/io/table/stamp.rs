@@ -14,6 +14,34 @@ pub(super) struct Stamp {
     exponent: i32,
     /// It was a date or a time of day, in seconds.
     pub(super) is_date: bool,
+    /// It was a time of day alone.
+    is_of_day: bool,
+}
+
+/// Seconds of a day.
+const DAY: i64 = 86_400;
+
+/// The days of a recording whose stamps are times of day.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Days {
+    last: Option<Stamp>,
+    midnights: i64,
+}
+
+impl Days {
+    /// The next stamp, after the midnights so far: one that is more than half a day before the last follows
+    /// another midnight.
+    pub(super) fn count(&mut self, stamp: Stamp) -> Stamp {
+        if !stamp.is_of_day {
+            return stamp;
+        }
+        if self.last.is_some_and(|last| last.since(stamp) > 0.5 * DAY as f64) {
+            self.midnights += 1;
+        }
+        self.last = Some(stamp);
+        let unit = 10_i64.pow(stamp.exponent.unsigned_abs());
+        Stamp { mantissa: stamp.mantissa + self.midnights * DAY * unit, ..stamp }
+    }
 }
 
 impl Stamp {
@@ -86,13 +114,14 @@ fn decimal(text: &str) -> Option<Stamp> {
         }
     }
     let mantissa = if number.starts_with('-') { -mantissa } else { mantissa };
-    any.then_some(Stamp { mantissa, exponent, is_date: false })
+    any.then_some(Stamp { mantissa, exponent, is_date: false, is_of_day: false })
 }
 
 /// `2026-11-28T10:00:00.125Z`, with a space for the T, with / for the -, with an offset from UTC, or the
 /// time of day alone. Seconds count from 1970, or from midnight.
 fn date_time(text: &str) -> Option<Stamp> {
-    let (date, time) = match text.find(['T', ' ', '_']) {
+    let start = text.find(['T', ' ', '_']);
+    let (date, time) = match start {
         Some(at) => (days(&text[..at])?, &text[at + 1..]),
         None => (0, text),
     };
@@ -109,10 +138,11 @@ fn date_time(text: &str) -> Option<Stamp> {
     if parts.next().is_some() || hour > 23 || minute > 59 || second > 60 {
         return None;
     }
-    let seconds = 86_400 * date + 3600 * hour + 60 * minute + second - offset;
+    let seconds = DAY * date + 3600 * hour + 60 * minute + second - offset;
     let fraction = if decimals.is_empty() { 0 } else { whole(decimals, DATE_DECIMALS)? };
     let mantissa = seconds.checked_mul(10_i64.pow(decimals.len() as u32))?.checked_add(fraction)?;
-    Some(Stamp { mantissa, exponent: -(decimals.len() as i32), is_date: true })
+    let exponent = -(decimals.len() as i32);
+    Some(Stamp { mantissa, exponent, is_date: true, is_of_day: start.is_none() })
 }
 
 /// Up to `most` digits.
@@ -175,6 +205,18 @@ mod tests {
         assert_eq!(since("0.3", "0.1"), 0.2);
         assert_eq!(since("2026-11-28T10:00:00.000123Z", "2026-11-28 09:59:59"), 1.000_123);
         assert_eq!(since("1e-300", "1"), -1.0);
+    }
+
+    #[test]
+    fn times_of_day_go_on_after_midnight() {
+        let mut days = Days::default();
+        let mut count = |text: &str| days.count(Stamp::parse(text).unwrap()).value();
+        assert_eq!(
+            ["23:59:59.5", "00:00:00.5", "23:00:00", "01:00"].map(&mut count),
+            [86_399.5, 86_400.5, 169_200.0, 176_400.0]
+        );
+        // A step back stays one, and dates say their day.
+        assert_eq!(["00:59:00", "1970-01-01T01:00:00"].map(count), [176_340.0, 3600.0]);
     }
 
     #[test]

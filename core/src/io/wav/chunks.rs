@@ -5,7 +5,7 @@ use crate::io::IoError;
 use std::io::{self, Read};
 
 /// Names that may follow an odd chunk at once, where a writer forgot the pad byte.
-const KNOWN: [&[u8; 4]; 16] = [
+pub(super) const KNOWN: [&[u8; 4]; 16] = [
     b"data", b"fmt ", b"fact", b"LIST", b"JUNK", b"junk", b"PAD ", b"FLLR", b"bext", b"cue ", b"smpl",
     b"inst", b"PEAK", b"id3 ", b"iXML", b"ds64",
 ];

@@ -1,6 +1,6 @@
 //! Reads frames from a WAV file or stream.
 
-use super::chunks::Chunks;
+use super::chunks::{Chunks, KNOWN};
 use super::header::{WavChunk, WavHeader};
 use crate::io::capture::{ByteSource, InputNotes};
 use crate::io::{IoError, StreamHeader};
@@ -79,6 +79,11 @@ impl<R: Read> ByteSource for WavReader<R> {
             let [a, b, c, d, size @ ..] = head;
             let (id, size) = ([a, b, c, d], u64::from(u32::from_le_bytes(size)));
             pad = size % 2;
+            // After no samples at all, what is no chunk is samples of a header that was not completed.
+            if data_bytes == 0 && !KNOWN.contains(&&id) {
+                self.further = head.len() as u64 + io::copy(inner, &mut io::sink()).unwrap_or(0);
+                break;
+            }
             if &id == b"data" {
                 self.further = self.further.saturating_add(size);
             }

@@ -446,6 +446,39 @@ proptest! {
 }
 
 #[test]
+fn what_is_no_number_is_answered_with_how_to_write_it() {
+    for (line, remedy) in [
+        (
+            "11/28/2026 10:00:00,0.5",
+            "\"11/28/2026 10:00:00\": write a number, or a date as 2026-11-28T10:00:00.125Z",
+        ),
+        ("10:00:00.125 PM;0.5", "\"10:00:00.125 PM\": write a number, or a date"),
+        ("28.11.2026,0.5", "\"28.11.2026\": write a number, or a date"),
+        ("0.5 V,0.25 V", "\"0.5 V\": write units into the heading"),
+        ("0x1f3,0x200", "\"0x1f3\": write codes as decimal numbers"),
+    ] {
+        let refused = refusal(&format!("time,a\n{line}\n{line}\n"));
+        assert!(refused.contains(remedy), "{refused}");
+    }
+    let later = refusal("a,b\n0.5,0.25\n0.5 mV,0.25\n");
+    assert!(
+        later.contains("line 3: column 1: \"0.5 mV\" is no number; write units into the heading"),
+        "{later}"
+    );
+}
+
+#[test]
+fn channels_in_several_units_are_refused() {
+    let units = "time,A,B\n(ms),(V),(mV)\n0,0.5,250\n1,0.25,125\n";
+    let refused = refusal(units);
+    assert!(refused.contains("column 2 is in V and column 3 in mV; write them in one unit"), "{refused}");
+    let second = TableOptions { columns: vec![Column::Name("B".into())], ..TableOptions::default() };
+    assert_eq!(read_with(units, &second).unwrap().samples, [250.0, 125.0]);
+    assert_eq!(read(units.replace("(mV)", "(V)")).unwrap().samples.len(), 4);
+    assert_eq!(read(units.replace("(mV)", "(mA)")).unwrap().samples.len(), 4);
+}
+
+#[test]
 fn thousands_are_asked_about_and_columns_that_are_not_there_are_named() {
     let thousands = "a,b\n\"703\",\"1,046\"\n\"12\",\"999\"\n";
     assert!(
