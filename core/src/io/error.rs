@@ -175,6 +175,16 @@ pub enum InputFault {
         /// All samples.
         of: u64,
     },
+    /// Samples at one level within the range of the converter, where something before it clips.
+    #[error(
+        "channel {channel} is flat at {level:.4} of full scale far more often than its top could be: the signal is clipped there"
+    )]
+    FlatTop {
+        /// From 1, in the input.
+        channel: usize,
+        /// Where it is clipped, of full scale.
+        level: f64,
+    },
     /// The input is longer than the shortest one, which decided where to end.
     #[error(
         "longer than the shortest channel, {}{frames} samples per channel were not used",

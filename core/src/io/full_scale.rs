@@ -4,8 +4,10 @@
 //! 2047. They stand in the low bits of the word, or in the high ones where all codes are multiples of 16;
 //! the first codes other than 0 tell which. Words that count from 0 hold codes that count from 0.
 
+mod flat_tops;
 mod seen;
 
+use self::flat_tops::FlatTops;
 use self::seen::{Codes, Seen};
 use super::block::{Block, Numbers, with_numbers};
 use super::{InputFault, StreamHeader};
@@ -137,6 +139,7 @@ pub(super) struct Scaling {
     codes: Codes,
     rails: Option<(f64, f64)>,
     seen: Seen,
+    flat_tops: FlatTops,
     frames: u64,
 }
 
@@ -171,6 +174,7 @@ impl Scaling {
             codes: Codes::NONE,
             rails: stated.rails(header),
             seen: Seen::new(stated.rails(header)),
+            flat_tops: FlatTops::default(),
             frames: 0,
         })
     }
@@ -205,6 +209,7 @@ impl Scaling {
             }
         }
         block.parts.iter().for_each(|part| self.seen.take(part, begin));
+        self.flat_tops.take(block, first);
         if self.is_binding
             && self.limit().is_some_and(|limit| self.seen.least < -1.0 || self.seen.most > limit)
         {
@@ -292,7 +297,8 @@ impl Scaling {
             peak <= 1.0 && at_rails as f64 > by_chance
         });
         let clipped = clipped.then_some(InputFault::AtRails { count: at_rails, of: count });
-        unused.into_iter().chain(beyond).chain(clipped)
+        let flat_top = self.flat_tops.fault(self.rails.unwrap_or((f64::NEG_INFINITY, f64::INFINITY)));
+        unused.into_iter().chain(beyond).chain(clipped).chain(flat_top)
     }
 }
 
