@@ -212,7 +212,9 @@ impl BankRun<'_> {
         outputs.annotate(self.notes(reader, &report, placement)?);
         self.complete(outputs, &report, observer)?;
         let frames = reader.consumed();
-        Ok(Finished { report, frames, is_interrupted, dropped, peak, captures: checked.summary() })
+        let is_clipped = reader.warnings().iter().any(|warning| warning.fault.is_clipping());
+        let captures = checked.summary(is_clipped);
+        Ok(Finished { report, frames, is_interrupted, dropped, peak, captures })
     }
 
     /// The outputs at their beginning, of `rate` hertz.

@@ -95,6 +95,7 @@ pub(crate) struct FusedArray<'py> {
     peak: f64,
     /// What is odd about the samples of the input.
     odd: Vec<String>,
+    is_clipped: bool,
 }
 
 /// The output samples of an array.
@@ -143,6 +144,7 @@ fn filtered<'py>(
         outcome: Outcome { clipped: room.clipped, channels: bank.channel_count(), ..outcome },
         peak: room.peak(frames * bank.ratio * parts.len()),
         odd: odd_of(&decoders),
+        is_clipped: decoders.iter().any(|decoder| decoder.faults().any(|fault| fault.is_clipping())),
         y: array.finish()?,
         captures: Verdict::Unjudged.into(),
         frames,
@@ -164,12 +166,12 @@ impl FusedArray<'_> {
 
     /// The report of a run with so many output samples per second, as that of the command line.
     pub(crate) fn report<'py>(&self, py: Python<'py>, rate: f64) -> PyResult<Bound<'py, PyAny>> {
-        let Self { outcome, captures, frames, latency_dropped, seconds, peak, .. } = self;
+        let Self { outcome, captures, is_clipped, frames, latency_dropped, seconds, peak, .. } = self;
         let list = |gaps: &GapSummary| -> Vec<_> { gaps.list.iter().map(gap).collect() };
         Made::of(py, "FuseReport", outcome)?
             .with("frames", *frames)?
             .with("rate", rate)?
-            .with("captures", captures.summary())?
+            .with("captures", captures.summary(*is_clipped))?
             .with("latency_dropped", *latency_dropped)?
             .with("peak", *peak)?
             .with("seconds", *seconds)?

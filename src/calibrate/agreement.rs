@@ -29,6 +29,8 @@ const OFFSET_SHARE: f64 = 0.02;
 const BEYOND_FULL_SCALE: f64 = 1e3;
 /// Decibels that the comparison of short spectra can vouch for.
 const MOST_VOUCHED: f64 = 120.0;
+/// Decibels below which captures are not said to agree.
+const LITTLE_VOUCHED: f64 = 20.0;
 /// The spec explains captures that leave this share of their power unexplained.
 const UNEXPLAINED_SHARE: f64 = 0.1;
 
@@ -47,12 +49,10 @@ pub struct Agreement {
 pub enum Verdict {
     /// One alias per band, at the delays and gains of the spec, has this share of their power. The rest is
     /// what a bank for the spec gets wrong, whatever it promises.
-    #[error("the captures agree with the spec, and vouch for an SNR of {:.0} dB", vouched(*.0))]
+    #[error("{}", explained(vouched(*.0)))]
     Explained(f64),
     /// The same, and the signal does not tell its delays.
-    #[error(
-        "the captures do not contradict the spec, but this signal does not tell its delays, so no SNR is vouched for"
-    )]
+    #[error("the captures do not contradict the spec, but do not tell its delays, so no SNR is vouched for")]
     DelaysUntold(f64),
     /// Aliases overlap, or the signal fits other starts as well.
     #[error("this signal does not tell whether the captures agree with the spec")]
@@ -80,6 +80,17 @@ pub enum Verdict {
     Unjudged,
 }
 
+/// Captures that vouch for little say that something is wrong, and not what.
+fn explained(snr: f64) -> String {
+    if snr < LITTLE_VOUCHED {
+        format!(
+            "the captures fit the spec only to an SNR of {snr:.0} dB: look at their starts, delays and gains, and at their noise"
+        )
+    } else {
+        format!("the captures agree with the spec, and vouch for an SNR of {snr:.0} dB")
+    }
+}
+
 /// The SNR in decibels where a spec explains this share of the power, at most [`MOST_VOUCHED`].
 fn vouched(share: f64) -> f64 {
     (-10.0 * (1.0 - share).log10()).min(MOST_VOUCHED)
@@ -97,9 +108,10 @@ impl Agreement {
         self.contradictions.iter().map(ToString::to_string).collect()
     }
 
-    /// Whether the captures agree with the spec of a bank, in a line.
-    pub fn summary(&self) -> String {
+    /// Whether the captures agree with the spec of a bank, in a line; what clips is not in the SNR.
+    pub fn summary(&self, is_clipped: bool) -> String {
         match self.contradictions.len() {
+            0 if is_clipped => format!("{}; clipping is not counted", self.verdict),
             0 => self.verdict.to_string(),
             1 => "the captures do not agree with the spec of the bank, see the warning".to_owned(),
             count => {

@@ -198,6 +198,13 @@ pub enum InputFault {
     },
 }
 
+impl InputFault {
+    /// True if samples are at a limit beyond which the signal went.
+    pub fn is_clipping(&self) -> bool {
+        matches!(self, Self::AtRails { .. } | Self::FlatTop { .. })
+    }
+}
+
 /// A fault with the input that has it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{}: {fault}", Quoted(.input))]

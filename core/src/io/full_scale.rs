@@ -21,6 +21,8 @@ const UNUSED_BITS: u32 = 3;
 const ENOUGH_CODES: u64 = 256;
 /// So many times as often as a sine of full scale does a signal that is clipped reach the ends of the range.
 const CLIPPED_FACTOR: f64 = 2.0;
+/// And so many times as often as in a beginning in which few levels explain that it is there.
+const CHANCE: f64 = 1.5;
 /// As many samples may be there by chance in a short recording.
 const FEW_AT_RAILS: f64 = 16.0;
 /// Floats of streams have full scale 1 by convention and may exceed it; a peak of this size is a mistake.
@@ -168,7 +170,7 @@ impl Scaling {
             word: header.word,
             scale,
             is_binding,
-            is_open: found.is_none() && !header.is_scaled,
+            is_open: found.is_none() && stated.bits.is_none() && !header.is_scaled,
             usual_peak: WILD_PEAK,
             place: Place::Open,
             codes: Codes::NONE,
@@ -234,10 +236,11 @@ impl Scaling {
         };
     }
 
-    /// The highest sample of codes. Numbers that are no words may be means of codes.
+    /// The highest sample of codes. Numbers that are no words may be means of codes, and those of a full
+    /// scale in volts may be beyond it.
     fn limit(&self) -> Option<f64> {
-        let (_, highest) = self.scale?.rails()?;
-        Some(if self.word.is_some() { highest } else { 1.0 })
+        let highest = self.scale?.rails().map(|(_, highest)| highest);
+        if self.word.is_some() { highest.or(Some(1.0)) } else { highest.and(Some(1.0)) }
     }
 
     fn in_all_bits(&self, word: Word, scale: FullScale) -> String {
@@ -293,7 +296,8 @@ impl Scaling {
         let clipped = self.rails.is_some_and(|(_, highest)| {
             // A sine of full scale is within half a step of an end of the range for this share of the time.
             let of_sine = FRAC_2_PI * (1.0 - highest).sqrt();
-            let by_chance = (CLIPPED_FACTOR * of_sine * count as f64).max(FEW_AT_RAILS);
+            let share = (CLIPPED_FACTOR * of_sine).max(CHANCE * self.flat_tops.share_of_few_levels());
+            let by_chance = (share * count as f64).max(FEW_AT_RAILS);
             peak <= 1.0 && at_rails as f64 > by_chance
         });
         let clipped = clipped.then_some(InputFault::AtRails { count: at_rails, of: count });
@@ -430,6 +434,35 @@ mod tests {
         assert_eq!(read(&[1, 1024]), [1.0 / 2048.0, 0.5]);
         assert_eq!(read(&[16, 16384]), [1.0 / 2048.0, 0.5]);
         assert_eq!(read(&[1, 16384]), [1.0 / 32768.0, 0.5]);
+    }
+
+    #[test]
+    fn a_tone_of_full_scale_that_repeats_is_not_said_to_clip() {
+        let tone = |period: usize, peak: f64| {
+            let at = |k: usize| peak * (std::f64::consts::TAU * (k % period) as f64 / period as f64).cos();
+            let codes: Vec<i16> = (0..8000).map(|k| at(k).round().clamp(-32768.0, 32767.0) as i16).collect();
+            scaled(header(PcmFormat::S16Le), StatedScale::default(), &words(&codes)).unwrap().1
+        };
+        for period in [2, 4, 8, 12, 16, 20] {
+            assert_eq!(tone(period, 32767.0), [], "{period}");
+        }
+        assert!(matches!(tone(97, 60_000.0)[..], [InputFault::AtRails { of: 8000, .. }]));
+        // Most of its steps are at the rails: none is by chance.
+        assert!(matches!(tone(64, 1e5)[..], [InputFault::AtRails { .. }]));
+    }
+
+    #[test]
+    fn bits_of_the_spec_and_codes_beyond_a_number_are_heeded() {
+        let of_spec = StatedScale { bits: Some(16), ..StatedScale::default() };
+        let quiet = words(&[1, 2047, -2048].repeat(100));
+        assert_eq!(scaled(header(PcmFormat::S16Le), of_spec, &quiet).unwrap().1, []);
+        let thousand = given(FullScale::Number(1000.0));
+        assert_eq!(
+            scaled(header(PcmFormat::S16Le), thousand, &words(&[1000, -1000])).unwrap().0,
+            [1.0, -1.0]
+        );
+        let beyond = scaled(header(PcmFormat::S16Le), thousand, &words(&[1, 1001])).unwrap_err();
+        assert!(beyond.contains("frame 1 (from 0) of channel 1 has the code 1001"), "{beyond}");
     }
 
     #[test]

@@ -82,7 +82,7 @@ pub enum InputMismatch {
     },
     /// Two inputs whose times begin more than a sample apart.
     #[error(
-        "{}: its times begin {} s {} those of {}; cut the recordings to a common start, or leave out the columns of time if \
+        "{}: its times begin {} s {} those of {}; cut the recordings to a common start, or leave out the times (columns, bext chunks) if \
          their clocks have no common zero",
         Quoted(.input), Number(.apart.abs()), if *.apart > 0.0 { "after" } else { "before" }, Quoted(.other)
     )]

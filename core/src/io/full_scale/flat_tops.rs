@@ -10,7 +10,7 @@ const LOOKED_AT: usize = 1 << 18;
 /// Numbers of one level differ by the rounding of what computed them: this share of it.
 const SAME: f64 = 1.0 / 65536.0;
 /// So many times as often as a sine with the same step below its top does a clipped signal reach its top.
-const FACTOR: f64 = 4.0;
+const FACTOR: f64 = 2.0;
 /// As many samples may be there by chance in a short recording.
 const FEW: f64 = 64.0;
 
@@ -72,6 +72,17 @@ impl FlatTops {
         });
     }
 
+    /// The largest share of a channel's samples at tops that are not flat: a tone that repeats after few
+    /// samples has few levels, and is at the largest one often.
+    pub(super) fn share_of_few_levels(&self) -> f64 {
+        let shares = self.tops.iter().map(|[high, low]| {
+            let amplitude = 0.5 * (high.level + low.level);
+            let plain = [high, low].into_iter().filter(|top| !top.is_flat(amplitude, self.frames));
+            plain.map(|top| top.count).sum::<usize>() as f64 / self.frames.max(1) as f64
+        });
+        shares.fold(0.0, f64::max)
+    }
+
     /// The first channel that is clipped within the rails.
     pub(super) fn fault(&self, rails: (f64, f64)) -> Option<InputFault> {
         self.tops.iter().enumerate().find_map(|(channel, [high, low])| {
@@ -119,6 +130,7 @@ mod tests {
     fn clipped_sines_are_told() {
         assert_eq!(level(sine(0.1).map(|x| x.clamp(-0.5, 0.5))), Some(0.5));
         assert_eq!(level(sine(0.1).map(|x| x.max(-0.3))), Some(-0.3));
+        assert_eq!(level(rounded(sine(0.1).map(|x| x.min(0.6999)), 32768.0)), Some(22934.0 / 32768.0));
         assert_eq!(level(rounded(sine(0.1).map(|x| x.clamp(-0.3, 0.3)), 2048.0)), Some(614.0 / 2048.0));
         // Those at the rails are told by the rails.
         assert_eq!(level(sine(0.1).map(|x| (2.0 * x).clamp(-1.0, 1.0))), None);
@@ -129,6 +141,10 @@ mod tests {
         for steps in [10.0, 100.0, 2048.0, 32768.0, 1e15] {
             for per_sample in [0.1, 0.003, 1.0, PI / 8.0, PI / 500.0] {
                 assert_eq!(level(rounded(sine(per_sample), steps)), None, "{steps} {per_sample}");
+            }
+            for period in 3..200 {
+                let coherent = rounded(sine(2.0 * PI / f64::from(period)), steps);
+                assert_eq!(level(coherent), None, "{steps} {period}");
             }
         }
         let square = (0..20_000).map(|k| if k % 20 < 10 { 0.5 } else { -0.5 });

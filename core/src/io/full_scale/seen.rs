@@ -6,9 +6,6 @@ use crate::io::block::{Block, Numbers, with_numbers};
 use crate::quantity::FullScale;
 use crate::runtime::Sample;
 
-/// Numbers that are compared side by side.
-const LANES: usize = 16;
-
 /// The codes of words so far, from the middle of their range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Codes {
@@ -80,11 +77,11 @@ impl Seen {
 
     fn take_numbers<T: Sample>(&mut self, numbers: &[T]) {
         let (low, high) = (T::from_f64(self.rails.0), T::from_f64(self.rails.1));
-        let (mut least, mut most) = extremes(numbers);
+        let (mut least, mut most) = T::extremes(numbers);
         if least <= low || most >= high {
             let finite = || numbers.iter().copied().filter(|x| x.to_f64().is_finite());
             self.at_rails += finite().filter(|x| *x <= low || *x >= high).count() as u64;
-            (least, most) = extremes(&finite().collect::<Vec<T>>());
+            (least, most) = T::extremes(&finite().collect::<Vec<T>>());
         }
         self.least = self.least.min(least.to_f64());
         self.most = self.most.max(most.to_f64());
@@ -92,18 +89,4 @@ impl Seen {
         let is_whole = |x: &T| x.to_f64().fract() == 0.0 || x.to_f64().is_nan();
         self.are_whole = self.are_whole && numbers.iter().all(is_whole);
     }
-}
-
-/// The least and the most of some numbers and 0, without NaN: lane by lane, which vectors do at once.
-fn extremes<T: Sample>(numbers: &[T]) -> (T, T) {
-    let zero = T::from_f64(0.0);
-    let (mut least, mut most) = ([zero; LANES], [zero; LANES]);
-    for chunk in numbers.chunks(LANES) {
-        for ((least, most), &x) in least.iter_mut().zip(&mut most).zip(chunk) {
-            *least = if x < *least { x } else { *least };
-            *most = if x > *most { x } else { *most };
-        }
-    }
-    let least = least.into_iter().fold(zero, |a, b| if b < a { b } else { a });
-    (least, most.into_iter().fold(zero, |a, b| if b > a { b } else { a }))
 }

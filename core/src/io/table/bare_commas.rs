@@ -37,10 +37,11 @@ impl BareCommas {
             return None;
         }
         let (whole, decimals) = pairs().find(|(whole, decimals)| *whole == "-0" || is_padded(decimals))?;
+        let single = if cells.count == 2 { "--decimal comma, or " } else { "" };
         Some(format!(
             "{whole},{decimals} looks like one number with a decimal comma, which is the delimiter too; write the table with \
-             ; between its cells or with decimal points, or state which mark the decimals have (--decimal comma, or \
-             --decimal point if these are two numbers)"
+             ; between its cells or with decimal points, or state which mark the decimals have ({single}--decimal \
+             point if these are two numbers)"
         ))
     }
 }

@@ -125,7 +125,7 @@ pub(super) fn may_be_thousands(cell: &str) -> bool {
 }
 
 /// How a time is written.
-pub(super) const AS_TIME: &str = "write a number, or a date as 2026-11-28T10:00:00.125Z";
+pub(super) const AS_TIME: &str = "write a number, or date and time in one cell as 2026-11-28T10:00:00.125Z";
 
 /// What to do about a cell that is no number, if it is clear what it was to be.
 pub(super) fn remedy(cell: &str) -> Option<&'static str> {
@@ -134,7 +134,7 @@ pub(super) fn remedy(cell: &str) -> Option<&'static str> {
     let number = cell[..cell.len() - letters.len()].trim_end();
     if cell.strip_prefix("0x").or(cell.strip_prefix("0X")).is_some_and(is_of_digits) {
         Some("write codes as decimal numbers")
-    } else if cell.contains(':') || cell.matches(['/', '.', '-']).count() > 1 {
+    } else if cell.contains(':') || ['/', '.', '-'].iter().any(|mark| cell.matches(*mark).count() > 1) {
         Some(AS_TIME)
     } else {
         (!letters.is_empty() && parse(number).is_some_and(f64::is_finite))

@@ -46,7 +46,8 @@ impl Unsteady {
         match self {
             Self::Coarse { digit, step } => format!(
                 "the last digit of its time is {}, which does not show the step of about {}; write more digits, or state \
-                 that no column is the time and which ones are channels (--time-column none, and --columns with theirs)",
+                 that no column is the time and which ones are channels (--time-column none, and --columns with theirs), or \
+                 give `measure` the --rate",
                 time(digit),
                 time(step)
             ),

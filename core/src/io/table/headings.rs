@@ -34,7 +34,13 @@ const BESIDE: [&str; 10] = ["x", "axis", "stamp", "utc", "local", "relative", "s
 /// Words of a column that numbers the lines.
 const INDICES: [&str; 9] = ["index", "idx", "sample", "samples", "sequence", "n", "no", "number", "point"];
 /// Units of time.
-const UNITS: [(&str, f64); 22] = [
+const UNITS: [(&str, f64); 28] = [
+    ("h", 3600.0),
+    ("hour", 3600.0),
+    ("hours", 3600.0),
+    ("min", 60.0),
+    ("minute", 60.0),
+    ("minutes", 60.0),
     ("s", 1.0),
     ("sec", 1.0),
     ("secs", 1.0),
@@ -126,15 +132,16 @@ pub(super) struct Unit {
     pub(super) written: String,
 }
 
+/// What stands in brackets at the end of a text.
+fn in_brackets(text: &str) -> Option<&str> {
+    let text = text.trim();
+    text[text.find(['(', '['])? + 1..].strip_suffix([')', ']'])
+}
+
 impl Unit {
     /// Of the cell of a line of units, or of brackets in a heading.
     pub(super) fn of(heading: &str, below: &str) -> Option<Self> {
-        let in_brackets = |text: &str| {
-            let text = text.trim();
-            let from = text.find(['(', '['])?;
-            text[from + 1..].strip_suffix([')', ']']).map(str::to_owned)
-        };
-        let written = in_brackets(below).or_else(|| in_brackets(heading)).unwrap_or_else(|| below.to_owned());
+        let written = in_brackets(below).or_else(|| in_brackets(heading)).unwrap_or(below);
         let lower = written.trim().to_lowercase();
         let of = |&(prefix, size): &(&str, &'static str)| {
             let quantity = QUANTITIES.iter().find(|(name, _)| lower.strip_prefix(prefix) == Some(name))?.1;
@@ -193,12 +200,13 @@ pub(super) fn stated_rate(lines: &[Vec<String>]) -> Option<StatedRate> {
         }
         let below = lines.get(line + 1).and_then(|below| below.get(column));
         let after = &lines[line][column + 1..];
+        let of_name = in_brackets(name);
         let value = |(k, text): (usize, &str)| {
             let unit = if k == 0 { None } else { after.get(k).map(String::as_str) };
-            stated(text, unit, is_rate)
+            stated(text, of_name.or(unit), is_rate)
         };
         let values = std::iter::once(rest).chain(after.iter().map(|cell| split_name(cell).1));
-        values.enumerate().find_map(value).or_else(|| stated(below?, None, is_rate))
+        values.enumerate().find_map(value).or_else(|| stated(below?, of_name, is_rate))
     })
 }
 
@@ -224,10 +232,16 @@ fn stated(text: &str, next: Option<&str>, is_rate: bool) -> Option<StatedRate> {
     let text = text.trim().replace(',', ".");
     let number = text.trim_end_matches(|c: char| !c.is_ascii_digit() && c != '.');
     let value = if is_rate {
-        quantity::rate(&text).ok()?.0
+        let unit = next.filter(|_| number == text).unwrap_or_default();
+        let text = format!("{text} {unit}").replace("Sa/s", "S/s");
+        quantity::rate(text.trim()).or_else(|_| quantity::rate(number)).ok()?.0
     } else {
         let Ok(WrittenTime::Seconds(time)) = quantity::time(&text) else { return None };
-        time.0 * next.filter(|_| number == text).and_then(|next| unit_of(next.trim())).unwrap_or(1.0)
+        time.0
+            * next
+                .filter(|_| number == text)
+                .and_then(|next| unit_of(&next.trim().to_lowercase()))
+                .unwrap_or(1.0)
     };
     let stamp = Stamp::parse(number).filter(|_| value.is_finite() && value > 0.0)?;
     let rounding = if stamp.digits() <= ROUND { 0.0 } else { 0.5 * stamp.digit() / stamp.value() };
@@ -255,6 +269,9 @@ mod tests {
             ("X", "Sequence", Role::Index),
             ("time (µs)", "", Role::Time(Some(1e-6))),
             ("ms", "", Role::Time(Some(1e-3))),
+            ("Time (min)", "", Role::Time(Some(60.0))),
+            ("Time (h)", "", Role::Time(Some(3600.0))),
+            ("min", "", Role::Other),
             ("timestamp", "", Role::Time(None)),
             ("Date Time", "", Role::Time(None)),
             ("elapsed (ns)", "", Role::Time(Some(1e-9))),
@@ -305,6 +322,11 @@ mod tests {
             ("Sample rate: 100000Hz", 1e5),
             ("Samplerate: 1 MHz", 1e6),
             ("XINCR,2.5,ms", 400.0),
+            ("Sample Interval [us],2.5", 4e5),
+            ("Sample interval (us): 2.5", 4e5),
+            ("Increment (ms),2.5", 400.0),
+            ("Sample Rate [kHz],24", 24e3),
+            ("Sample Rate,24 kSa/s", 24e3),
             ("Sampling Rate = 48 kS/s", 48e3),
         ] {
             let found = rate(text).unwrap();

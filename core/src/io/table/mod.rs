@@ -167,11 +167,12 @@ impl<R: Read> Table<R> {
         let least = (0..width).rev().find(|&column| !is_blank(column)).map_or(width, |last| last + 1);
         if count < least || (width..count).any(|column| !self.cells.get(column).is_empty()) {
             return Err(self.fault(&format!(
-                "{}, but the lines before have {width}; one column per channel",
+                "{}, but the lines before have {width}; give one column per channel, and cut off what follows the table",
                 counted(count, "cell")
             )));
         }
-        match (0..width).find(|&column| is_blank(column) && !self.cells.get(column).is_empty()) {
+        let is_beside = |column: &usize| is_blank(*column) && !self.cells.get(*column).is_empty();
+        match (0..width).find(is_beside).filter(|_| !self.preamble.is_beside) {
             Some(column) => Err(self.fault(&format!(
                 "column {}: \"{}\", but the column is empty in the first line and has no heading; give it one",
                 column + 1,
@@ -221,7 +222,8 @@ impl<R: Read> Table<R> {
                 Some(Decimal::Comma) => "decimals have a comma in this table",
                 _ => "decimals have a point",
             };
-            let separated = format!("{mark}, and cells are separated by , ; tab or space");
+            let separated =
+                format!("{mark}, cells are separated by , ; tab or space, and nothing follows the table");
             let remedy = cells::remedy(cell).unwrap_or(&separated);
             self.fault(&format!("column {}: \"{}\" is no number; {remedy}", column + 1, Quoted(cell)))
         })

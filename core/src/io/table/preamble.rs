@@ -1,7 +1,7 @@
 //! Finds the first line of numbers, and what the lines before it say.
 
 use super::cells::{Cells, Numbers, may_be_thousands, remedy};
-use super::headings::{self, StatedRate};
+use super::headings::{self, Role, StatedRate};
 use super::options::{Column, Decimal, Delimiter, TableOptions, TimeColumn};
 use super::stamp::Stamp;
 use super::text::Lines;
@@ -12,6 +12,8 @@ use std::io::Read;
 
 /// Most lines before the first one of numbers.
 const MOST_LINES: usize = 1000;
+/// Lines at hand after one with numbers in the chosen columns among which one of numbers alone is looked for.
+const LOOKED_AHEAD: usize = 256;
 /// Lines above the first one of numbers in which headings are looked for.
 const HEADINGS_ABOVE: usize = 4;
 /// Most lines of a table of headings alone.
@@ -28,6 +30,8 @@ pub(super) struct Preamble {
     pub(super) ahead: VecDeque<NumberedLine>,
     /// How many of them have words of the preamble in the columns that hold nothing.
     pub(super) beside: usize,
+    /// Lines of numbers may have such words.
+    pub(super) is_beside: bool,
     /// Headings, and the cells below them where there is a line of units; as many as the first line of
     /// numbers has cells.
     pub(super) names: Vec<String>,
@@ -52,19 +56,32 @@ impl Default for Layout {
 }
 
 impl Preamble {
-    /// Reads up to the first line of numbers, or to the end.
+    /// Reads up to the first line of numbers, or to the end. Where columns are chosen, the others may hold
+    /// words; then it is the first line with numbers in those, unless one of numbers alone follows.
     pub(super) fn read<R: Read>(lines: &mut Lines<R>, options: &TableOptions) -> Result<Self, IoError> {
         let mut skipped: Vec<NumberedLine> = Vec::new();
+        let mut among_words: Option<(Layout, usize)> = None;
         loop {
+            if let Some((layout, at)) = &among_words
+                && (!lines.is_more_at_hand() || skipped.len() - at >= LOOKED_AHEAD)
+            {
+                let (layout, ahead) = (layout.clone(), skipped.split_off(*at).into());
+                return Ok(Self::found(layout, skipped, ahead));
+            }
             let Some(line) = lines.next()? else { return Self::of_headings(lines, &skipped, options) };
             let line = line.to_vec();
             let line = (lines.number, line);
-            let Some(layout) = layout_of(&line.1, &skipped, options) else {
-                if layout_of(&line.1, &skipped, &options.without_columns()).is_some() {
+            let layout = layout_of(&line.1, &skipped, options);
+            let is_of_numbers = layout_of(&line.1, &skipped, &options.without_columns()).is_some();
+            let Some(layout) = layout.clone().filter(|_| is_of_numbers) else {
+                if is_of_numbers {
                     return Err(lines.fault(&not_there(&skipped, options)));
                 }
+                if among_words.is_none() {
+                    among_words = layout.map(|layout| (layout, skipped.len()));
+                }
                 skipped.push(line);
-                if skipped.len() == MOST_LINES {
+                if skipped.len() == MOST_LINES && among_words.is_none() {
                     return Err(lines.fault(&no_numbers(&skipped, options)));
                 }
                 continue;
@@ -109,24 +126,27 @@ impl Preamble {
         let delimiter = layout.delimiter;
         let first = split(&ahead[0].1, delimiter);
         let plain = ahead.len();
-        if layout.chosen.is_empty() {
-            while skipped.last().is_some_and(|line| is_beside(&split(&line.1, delimiter), &first)) {
-                ahead.extend(skipped.pop());
-                ahead.rotate_right(1);
-            }
+        while skipped.last().is_some_and(|line| is_beside(&split(&line.1, delimiter), &first)) {
+            ahead.extend(skipped.pop());
+            ahead.rotate_right(1);
         }
-        let cells: Vec<Vec<String>> = skipped.iter().map(|(_, line)| split(line, delimiter)).collect();
+        let cells: Vec<Vec<String>> =
+            skipped.iter().map(|(_, line)| split_heading(line, delimiter)).collect();
         let (mut names, mut units) = headings_of(&cells, first.len());
         names.iter_mut().filter(|name| headings::is_of_preamble(name)).for_each(String::clear);
         names.resize(first.len(), String::new());
         units.resize(first.len(), String::new());
-        let is_blank = |(cell, name): (&String, &String)| cell.is_empty() && name.is_empty();
+        // Settings of an instrument may stand in a column of their own, with `Time` among them.
+        let is_blank = |(cell, name): (&String, &String)| {
+            cell.is_empty() && (name.is_empty() || matches!(headings::role(name, ""), Role::Time(_)))
+        };
         let blank = first.iter().zip(&names).map(is_blank).collect();
-        let words = if delimiter == Delimiter::Space { Delimiter::Comma } else { delimiter };
         let beside = ahead.len() - plain;
         let preamble = skipped.iter().chain(ahead.iter().take(beside));
-        let cells: Vec<Vec<String>> = preamble.map(|(_, line)| split(line, words)).collect();
-        Self { layout, ahead, beside, names, units, stated: headings::stated_rate(&cells), blank }
+        let words = |line: &[u8]| split(line, delimiter_of_words(line, delimiter));
+        let cells: Vec<Vec<String>> = preamble.map(|(_, line)| words(line)).collect();
+        let is_beside = beside > 0;
+        Self { layout, ahead, beside, is_beside, names, units, stated: headings::stated_rate(&cells), blank }
     }
 }
 
@@ -175,6 +195,25 @@ fn split(line: &[u8], delimiter: Delimiter) -> Vec<String> {
     let mut cells = Cells::new(delimiter);
     cells.split(line);
     cells.iter().map(str::to_owned).collect()
+}
+
+/// The cells of a heading, which may be a comment.
+fn split_heading(line: &[u8], delimiter: Delimiter) -> Vec<String> {
+    let Some(comment) = line.strip_prefix(b"#") else { return split(line, delimiter) };
+    let mut cells = split(comment.trim_ascii_start(), delimiter);
+    cells.first_mut().into_iter().for_each(|cell| cell.insert(0, '#'));
+    cells
+}
+
+/// The delimiter of a line of words above numbers; of a single column there is none to be seen.
+fn delimiter_of_words(line: &[u8], delimiter: Delimiter) -> Delimiter {
+    let others = [Delimiter::Comma, Delimiter::Semicolon, Delimiter::Tab];
+    match delimiter {
+        Delimiter::Comma | Delimiter::Space => {
+            others.into_iter().find(|other| line.contains(&other.byte())).unwrap_or(Delimiter::Comma)
+        }
+        other => other,
+    }
 }
 
 /// How a line of numbers is split; `None` if it is none.

@@ -2,6 +2,8 @@
 
 /// Most decimals of the seconds of a date, so that all digits fit an `i64`.
 const DATE_DECIMALS: usize = 9;
+/// Most digits of minutes.
+const MINUTE_DIGITS: usize = 6;
 /// Largest power of ten; doubles have none beyond it.
 const MOST_POWER: i32 = 350;
 /// Most decades by which two stamps may be brought to one exponent exactly.
@@ -118,13 +120,14 @@ fn decimal(text: &str) -> Option<Stamp> {
 }
 
 /// `2026-11-28T10:00:00.125Z`, with a space for the T, with / for the -, with an offset from UTC, or the
-/// time of day alone. Seconds count from 1970, or from midnight.
+/// time of day alone, or minutes and seconds with decimals. Seconds count from 1970, or from midnight.
 fn date_time(text: &str) -> Option<Stamp> {
     let start = text.find(['T', ' ', '_']);
     let (date, time) = match start {
         Some(at) => (days(&text[..at])?, &text[at + 1..]),
         None => (0, text),
     };
+    let is_of_day = start.is_none();
     let time = time.trim_end_matches("UTC").trim_end_matches(['Z', ' ']);
     let (time, offset) = match time.rfind(['+', '-']) {
         Some(at) => (&time[..at], offset(&time[at..])?),
@@ -132,17 +135,25 @@ fn date_time(text: &str) -> Option<Stamp> {
     };
     let (clock, decimals) = time.split_once(['.', ',']).unwrap_or((time, ""));
     let decimals = decimals.get(..decimals.len().min(DATE_DECIMALS))?;
+    let fraction = if decimals.is_empty() { 0 } else { whole(decimals, DATE_DECIMALS)? };
+    let stamp = |seconds: i64, is_of_day| {
+        let mantissa = seconds.checked_mul(10_i64.pow(decimals.len() as u32))?.checked_add(fraction)?;
+        Some(Stamp { mantissa, exponent: -(decimals.len() as i32), is_date: true, is_of_day })
+    };
+    if let Some((minutes, seconds)) =
+        clock.split_once(':').filter(|(_, seconds)| is_of_day && !seconds.contains(':'))
+    {
+        // 10:00 may be hours or minutes.
+        let seconds = whole(seconds, 2).filter(|seconds| *seconds < 60 && !decimals.is_empty())?;
+        return stamp(60 * whole(minutes, MINUTE_DIGITS)? + seconds, false);
+    }
     let mut parts = clock.split(':').map(|part| whole(part, 2));
     let (hour, minute) = (parts.next()??, parts.next()??);
     let second = parts.next().unwrap_or(Some(0))?;
     if parts.next().is_some() || hour > 23 || minute > 59 || second > 60 {
         return None;
     }
-    let seconds = DAY * date + 3600 * hour + 60 * minute + second - offset;
-    let fraction = if decimals.is_empty() { 0 } else { whole(decimals, DATE_DECIMALS)? };
-    let mantissa = seconds.checked_mul(10_i64.pow(decimals.len() as u32))?.checked_add(fraction)?;
-    let exponent = -(decimals.len() as i32);
-    Some(Stamp { mantissa, exponent, is_date: true, is_of_day: start.is_none() })
+    stamp(DAY * date + 3600 * hour + 60 * minute + second - offset, is_of_day)
 }
 
 /// Up to `most` digits.
@@ -212,7 +223,7 @@ mod tests {
         let mut days = Days::default();
         let mut count = |text: &str| days.count(Stamp::parse(text).unwrap()).value();
         assert_eq!(
-            ["23:59:59.5", "00:00:00.5", "23:00:00", "01:00"].map(&mut count),
+            ["23:59:59.5", "00:00:00.5", "23:00:00", "01:00:00"].map(&mut count),
             [86_399.5, 86_400.5, 169_200.0, 176_400.0]
         );
         // A step back stays one, and dates say their day.
@@ -228,10 +239,13 @@ mod tests {
             ("2000-02-29 12:00 UTC", 951_825_600.0),
             ("2026-11-28 04:30:00-0530", 1_795_860_000.0),
             ("01:02:03.25", 3723.25),
+            ("01:00.5", 60.5),
+            ("75:00.0", 4500.0),
         ] {
             assert_eq!(Stamp::parse(text).map(Stamp::value), Some(seconds), "{text}");
         }
-        for text in ["10:", "25:00:00", "2026-13-01 00:00:00", "1:2:3:4", "2026-11-28T10:00:é", ":", "-1:00"]
+        for text in
+            ["10:00", "10:", "25:00:00", "2026-13-01 00:00:00", "1:2:3:4", "2026-11-28T10:00:é", ":", "-1:00"]
         {
             assert_eq!(Stamp::parse(text), None, "{text}");
         }

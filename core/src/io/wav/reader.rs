@@ -2,15 +2,16 @@
 
 use super::chunks::{Chunks, KNOWN};
 use super::header::{WavChunk, WavHeader};
+use crate::files::fill;
 use crate::io::capture::{ByteSource, InputNotes};
 use crate::io::{IoError, StreamHeader};
-use std::io::{self, Read, Take};
+use std::io::{self, Chain, Cursor, Read, Take};
 
 /// A WAV source, positioned after its header; it reads as the bytes of its samples.
 #[derive(Debug)]
 pub struct WavReader<R> {
     header: WavHeader,
-    data: Take<R>,
+    data: Take<Chain<Cursor<Vec<u8>>, R>>,
     /// Bytes in further data chunks.
     further: u64,
 }
@@ -22,8 +23,17 @@ impl<R: Read> WavReader<R> {
     /// [`IoError`] for anything that is not plain PCM in RIFF, RF64 or BW64.
     pub fn new(inner: R, file: &str) -> Result<Self, IoError> {
         let mut chunks = Chunks::open(inner, file)?;
-        let header = WavHeader::read(&mut chunks)?;
-        let data = chunks.into_inner().take(header.data_bytes.unwrap_or(u64::MAX));
+        let mut header = WavHeader::read(&mut chunks)?;
+        let mut inner = chunks.into_inner();
+        let mut peeked = Vec::new();
+        if header.data_bytes == Some(0) {
+            peeked.resize(4, 0);
+            let count = fill(&mut inner, &mut peeked).map_err(IoError::system(file, "read it"))?;
+            peeked.truncate(count);
+            // No chunk follows: the writer did not come to state how many samples there are.
+            header.data_bytes = (count == 0 || KNOWN.iter().any(|known| peeked == *known)).then_some(0);
+        }
+        let data = Cursor::new(peeked).chain(inner).take(header.data_bytes.unwrap_or(u64::MAX));
         Ok(Self { header, data, further: 0 })
     }
 
@@ -79,11 +89,6 @@ impl<R: Read> ByteSource for WavReader<R> {
             let [a, b, c, d, size @ ..] = head;
             let (id, size) = ([a, b, c, d], u64::from(u32::from_le_bytes(size)));
             pad = size % 2;
-            // After no samples at all, what is no chunk is samples of a header that was not completed.
-            if data_bytes == 0 && !KNOWN.contains(&&id) {
-                self.further = head.len() as u64 + io::copy(inner, &mut io::sink()).unwrap_or(0);
-                break;
-            }
             if &id == b"data" {
                 self.further = self.further.saturating_add(size);
             }

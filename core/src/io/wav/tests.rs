@@ -165,11 +165,8 @@ fn an_empty_data_chunk_before_others_is_empty() {
 
 /// A recorder that lost its power wrote the size of the file, and none of the data.
 #[test]
-fn samples_after_a_size_of_zero_are_told() {
-    let bytes = riff(&[chunk(b"fmt ", &fmt(1, 1, 2, 16)), chunk(b"data", &[]), counting(300)]);
-    let mut reader = WavReader::new(&bytes[..], "x.wav").unwrap();
-    assert!(reader.chunks_after().is_empty());
-    assert_eq!(reader.further_bytes(), 600);
+fn samples_after_a_size_of_zero_are_read() {
+    counts(&riff(&[chunk(b"fmt ", &fmt(1, 1, 2, 16)), chunk(b"data", &[]), counting(300)]), 300);
 }
 
 #[test]

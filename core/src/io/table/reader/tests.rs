@@ -450,11 +450,11 @@ fn what_is_no_number_is_answered_with_how_to_write_it() {
     for (line, remedy) in [
         (
             "11/28/2026 10:00:00,0.5",
-            "\"11/28/2026 10:00:00\": write a number, or a date as 2026-11-28T10:00:00.125Z",
+            "\"11/28/2026 10:00:00\": write a number, or date and time in one cell as 2026-11-28T10:00:00.125Z",
         ),
-        ("10:00:00.125 PM;0.5", "\"10:00:00.125 PM\": write a number, or a date"),
-        ("28.11.2026,0.5", "\"28.11.2026\": write a number, or a date"),
-        ("0.5 V,0.25 V", "\"0.5 V\": write units into the heading"),
+        ("10:00:00.125 PM;0.5", "\"10:00:00.125 PM\": write a number, or date and time"),
+        ("28.11.2026,0.5", "\"28.11.2026\": write a number, or date and time"),
+        ("-0.5 V,0.25 V", "\"-0.5 V\": write units into the heading"),
         ("0x1f3,0x200", "\"0x1f3\": write codes as decimal numbers"),
     ] {
         let refused = refusal(&format!("time,a\n{line}\n{line}\n"));
@@ -476,6 +476,40 @@ fn channels_in_several_units_are_refused() {
     assert_eq!(read_with(units, &second).unwrap().samples, [250.0, 125.0]);
     assert_eq!(read(units.replace("(mV)", "(V)")).unwrap().samples.len(), 4);
     assert_eq!(read(units.replace("(mV)", "(mA)")).unwrap().samples.len(), 4);
+}
+
+/// Numbers of a preamble are no samples, in whichever column they stand.
+#[test]
+fn chosen_columns_begin_where_the_table_does() {
+    let preamble = "Segments,1,Size,4002\n#1,28-Nov-2026,0\nVertical Scale,0.2\n";
+    let table = "t,1,2\n0,0.5,0.25\n0.001,0.125,1\n";
+    let columns = |list: &[usize]| list.iter().map(|k| Column::Number(*k)).collect();
+    let options = TableOptions { columns: columns(&[1, 2]), ..TableOptions::default() };
+    for text in [table.to_owned(), preamble.to_owned() + table] {
+        let found = read_with(&text, &options).unwrap();
+        assert_eq!(found.samples, [0.5, 0.25, 0.125, 1.0], "{text}");
+    }
+    // The first column holds words in every line.
+    let labelled = "name,1\none,0.5\ntwo,0.25\n";
+    let options = TableOptions { columns: columns(&[1]), ..TableOptions::default() };
+    assert_eq!(read_with(labelled, &options).unwrap().samples, [1.0, 0.5, 0.25]);
+}
+
+#[test]
+fn settings_beside_the_numbers_are_passed_by() {
+    let text = "Record Length,4,,-0.1,0.5,\nSample Interval,0.1,,0,0.25,\n,,,0.1,0.125,\n,,,0.2,1,\nSource,CH1,,0.3,0.5,\n";
+    // So few lines show no ramp.
+    let samples = [-0.1, 0.5, 0.0, 0.25, 0.1, 0.125, 0.2, 1.0, 0.3, 0.5];
+    assert_eq!(read(text).unwrap().samples, samples);
+    let empty = "Time,CH1,t0=-0.1,tInc=0.1,\n,0.5,\n,0.25,\n";
+    let found = read(empty).unwrap();
+    assert_eq!((found.samples, found.rate), (vec![0.5, 0.25], Some(10.0)));
+}
+
+#[test]
+fn a_comment_holds_headings() {
+    let found = read("# time v\n0 0.5\n0.25 1\n0.5 0\n").unwrap();
+    assert_eq!((found.samples, found.rate), (vec![0.5, 1.0, 0.0], Some(4.0)));
 }
 
 #[test]
