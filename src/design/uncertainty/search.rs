@@ -11,25 +11,36 @@
 use super::box_plant::{BoxPlant, BoxResponse, Combination};
 use crate::bank::SynthesisFilters;
 use crate::design::DesignError;
-use crate::design::error_grid::{Frequencies, GridFrequency, LocatedPeak, PRUNE_LEVEL};
+use crate::design::error_grid::{self, Frequencies, GridFrequency, LocatedPeak};
 use crate::design::filters::FilterResponse;
 use crate::linalg::{self, CMat, Complex};
 use crate::lti::peak::{Peak, local_maxima, refine};
 use crate::spec::ErrorPoint;
 use std::cell::OnceCell;
 
+/// What the search of a box tolerates.
+#[derive(Debug, Clone, Copy)]
+struct Settings {
+    /// A step that raises the gain by less (relative) ends the climb: what is left of it is rounding.
+    least_step: f64,
+    /// Relative change of a gain at which the refinement of a peak ends: a hundredth of the accuracy of a
+    /// robust norm.
+    flat_gain: f64,
+    /// Share of the largest peak from which on others are followed between the nodes, too. Robust banks
+    /// have many that are nearly equal, and a node is off its peak by some percent.
+    near_worst: f64,
+}
+
+/// Of every search.
+const SETTINGS: Settings = Settings { least_step: 1e-9, flat_gain: 1e-6, near_worst: 0.9 };
+
 /// Steps of a climb; two or three suffice.
 const MAX_STEPS: usize = 16;
-/// A step that raises the gain by less (relative) ends the climb.
-const LEAST_STEP: f64 = 1e-9;
 /// Combinations that are carried from one frequency to the next.
 const CARRIED: usize = 3;
-/// Relative change of a gain at which the refinement of a peak ends.
-const FLAT_GAIN: f64 = 1e-6;
 /// Peaks that are followed between the nodes, and the share of the largest that they have at least. Robust
 /// banks have many that are nearly equal.
 const FOLLOWED: usize = 6;
-const NEAR_WORST: f64 = 0.9;
 /// Halvings of the distance of the nodes while a peak is followed, from a quarter of the half-width: a gain
 /// is flat at its peak.
 const HALVINGS: i32 = 6;
@@ -109,7 +120,7 @@ impl BoxSearch {
         filters: &FilterResponse,
         level: f64,
     ) -> Result<Vec<LocatedPeak<Combination>>, DesignError> {
-        let found = self.sweep(filters, PRUNE_LEVEL * level)?;
+        let found = self.sweep(filters, error_grid::SETTINGS.prune_level * level)?;
         self.peaks_among(&found, filters, level)
     }
 
@@ -126,7 +137,10 @@ impl BoxSearch {
             .map(|(found, &frequency)| Peak { gain: highest(found), frequency })
             .collect();
         let mut peaks: Vec<LocatedPeak<Combination>> = Vec::new();
-        for around in local_maxima(&grid).into_iter().filter(|[_, peak, _]| peak.gain > PRUNE_LEVEL * level) {
+        for around in local_maxima(&grid)
+            .into_iter()
+            .filter(|[_, peak, _]| peak.gain > error_grid::SETTINGS.prune_level * level)
+        {
             let k = self.frequencies.all.partition_point(|omega| *omega < around[1].frequency);
             for start in self.exchanged(&found[k], k, filters)? {
                 let peak = self.refined(&start.combination, around, filters)?;
@@ -208,7 +222,7 @@ impl BoxSearch {
                 for choice in 0..self.plant.options()[i].len() {
                     combination[i] = choice;
                     let other = self.gain(response, &at, &combination)?;
-                    if other > gain * (1.0 + LEAST_STEP) {
+                    if other > gain * (1.0 + SETTINGS.least_step) {
                         (gain, best) = (other, choice);
                     }
                 }
@@ -243,7 +257,7 @@ impl BoxSearch {
         };
         let [low, middle, high] = around;
         let around = [at(low.frequency)?, at(middle.frequency)?, at(high.frequency)?];
-        refine(at, around, FLAT_GAIN)
+        refine(at, around, SETTINGS.flat_gain)
     }
 
     fn response(&self, k: usize) -> &BoxResponse {
@@ -257,7 +271,7 @@ impl BoxSearch {
     fn worst_points(&self, filters: &FilterResponse) -> Result<Vec<ErrorPoint>, DesignError> {
         let found = self.sweep(filters, 0.0)?;
         let most = found.iter().map(|found| highest(found)).fold(0.0, f64::max);
-        let mut peaks = self.peaks_among(&found, filters, NEAR_WORST * most)?;
+        let mut peaks = self.peaks_among(&found, filters, SETTINGS.near_worst * most)?;
         peaks.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let mut points: Vec<ErrorPoint> = Vec::new();
         for peak in peaks {
@@ -296,7 +310,7 @@ fn climb(
     let mut gain = 0.0;
     for _ in 0..MAX_STEPS {
         let svd = linalg::svd(&plant.error(response, filters, &combination))?;
-        if svd.s[0] <= gain * (1.0 + LEAST_STEP) {
+        if svd.s[0] <= gain * (1.0 + SETTINGS.least_step) {
             break;
         }
         gain = svd.s[0];
