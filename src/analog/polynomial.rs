@@ -15,7 +15,6 @@ use super::roots::RootSet;
 use super::square_free::{SquareFreeFactor, square_free_factors};
 
 /// What the search for roots tolerates.
-#[derive(Debug, Clone, Copy)]
 struct Settings {
     /// Relative error of a coefficient of a square-free factor: two roundings.
     coefficient_error: f64,

@@ -11,7 +11,6 @@ use crate::spec::{Band, Family, FilterSpec, Passband, SignalSpec, SignalSpectrum
 use crate::units::Hertz;
 
 /// The shape of W.
-#[derive(Debug, Clone, Copy)]
 struct Settings {
     /// Ripple of W over the band: figures hold for a flat band, and less ripple costs poles.
     ripple_db: f64,

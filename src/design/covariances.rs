@@ -15,7 +15,6 @@ use crate::units::FastPeriods;
 use std::f64::consts::TAU;
 
 /// How the integrals of the covariances are cut.
-#[derive(Debug, Clone, Copy)]
 struct Settings {
     /// Deviations beyond which a Gaussian counts as zero: 2e-19 of its power lies outside.
     gaussian_reach: f64,
@@ -51,7 +50,7 @@ impl Covariances {
         let joint = JointState::new(problem);
         let (transition, input) = joint.over(problem.ratio as f64);
         let root = controllability_root(&transition, &input)?;
-        let slopes = joint.slopes() * &root;
+        let slopes = &joint.slopes * &root;
         let mut poles = problem.signal.as_ref().map_or(Ok(Vec::new()), |w| linalg::eigenvalues(w.a()))?;
         for front_end in &problem.front_ends {
             poles.extend(linalg::eigenvalues(front_end.a())?);

@@ -14,7 +14,6 @@ use std::f64::consts::PI;
 use std::sync::OnceLock;
 
 /// What the grid takes for one frequency, one gain or no peak.
-#[derive(Debug, Clone, Copy)]
 pub(super) struct Settings {
     /// Around points below this share of a level there is no peak above the level: see [`STRIDE`].
     pub(super) prune_level: f64,

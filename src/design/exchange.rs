@@ -29,7 +29,6 @@ use crate::lmi::sampled::{self, FrequencyPoint, LowerBound, MeanSquareObjective,
 use crate::lti::FirMatrix;
 
 /// What the exchange tolerates.
-#[derive(Debug, Clone, Copy)]
 pub(super) struct Settings {
     /// Least relative margin of gamma for the secondary objective. Optimal unknowns are not unique, so even
     /// this margin lets the mean square improve.

@@ -9,7 +9,6 @@ use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
 
 /// Which aliases of an unbounded signal count.
-#[derive(Debug, Clone, Copy)]
 struct Settings {
     /// Fast rates up to which every alias of an unbounded signal counts by itself: there the front ends
     /// change fast.

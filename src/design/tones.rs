@@ -11,7 +11,6 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// How the worst tone is searched.
-#[derive(Debug, Clone, Copy)]
 struct Settings {
     /// Grid points for each peak that filters of a given length may have in a band: a refinement begins
     /// beside its top.

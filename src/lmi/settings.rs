@@ -1,7 +1,6 @@
 //! What the interior-point methods tolerate.
 
 /// What the interior-point methods tolerate.
-#[derive(Debug, Clone, Copy)]
 pub(super) struct Settings {
     /// Largest fraction of the way to the boundary of the cone that a step goes: on the boundary the next
     /// Newton matrix is singular.

@@ -3,7 +3,6 @@
 use std::f64::consts::PI;
 
 /// What the search for peaks tolerates.
-#[derive(Debug, Clone, Copy)]
 pub(super) struct Settings {
     /// Relative accuracy of the returned peak: far above the roundings of a gain, and far below what any
     /// figure shows.

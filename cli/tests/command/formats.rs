@@ -1,6 +1,6 @@
 //! Captures as tables, NumPy arrays, raw and complex samples. As a user runs it.
 
-use crate::support::{Desk, THESIS, bytes, channel, floats, frames, fused, interleaved, text, wav};
+use crate::support::{Desk, THESIS, bytes, channel, floats, frames, fused, interleaved, wav};
 use serde_json::Value;
 use std::fmt::Write as _;
 
@@ -86,81 +86,10 @@ fn captures_of_every_kind_give_the_same_samples() {
     desk.refused(1, &third, &["channel 3", "2 channels, counted from 1"]);
 }
 
-/// Files that SciPy wrote (tools/mat_fixtures.py): the two channels of one array, and two arrays of one
-/// file.
-#[test]
-fn captures_of_matlab_are_fused() {
-    let desk = Desk::new();
-    let seeds =
-        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("core/tests/fixtures/mat");
-    for name in ["compressed.mat", "several.mat", "complex.mat"] {
-        std::fs::copy(seeds.join(name), desk.path(name)).unwrap();
-    }
-    let formula = |k: usize, c: usize| ((7 * k + 3 * c) % 11) as f32 / 8.0 - 0.625;
-    let want = fused(&(0..40).flat_map(|k| [formula(k, 0), formula(k, 1)]).collect::<Vec<_>>());
-    for inputs in [&["compressed.mat"][..], &["several.mat:left", "several.mat:right"]] {
-        desk.report(&[&["fuse", "bank.json"], inputs, &["-o", "y.wav", "--keep-latency"]].concat());
-        let (spec, got) = wav::read(&desk.path("y.wav"));
-        // Only one of the files states a rate.
-        let rate = if inputs.len() == 1 { 48_000 } else { 1 };
-        assert_eq!((got, spec.sample_rate), (want.clone(), rate), "{inputs:?}");
-    }
-    let streamed = desk.run(&["stream", "bank.json", "--input", "compressed.mat"], &[]);
-    assert!(floats(&streamed.stdout) == want, "{streamed:?}");
-    let measured = desk.report(&["measure", "compressed.mat", "--channel", "1", "--harmonics", "1"]);
-    assert_eq!(measured["rate_hertz"], 24_000.0, "{measured}");
-    desk.refused(
-        1,
-        &["fuse", "bank.json", "several.mat", "-o", "n.wav"],
-        &["choose one, as several.mat:left"],
-    );
-    let same = ["fuse", "bank.json", "several.mat:left", "several.mat:right", "-o", "several.mat", "--force"];
-    desk.refused(1, &same, &["several.mat"]);
-}
-
-/// A recording made by ffmpeg (tools/flac_fixture.sh), as a capture that keeps every bit.
-#[test]
-fn flac_recordings_are_captures() {
-    let desk = Desk::new();
-    let fixture =
-        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("core/tests/fixtures/two.flac");
-    let sample =
-        |n: usize, f: f64| (16e3 * (std::f64::consts::TAU * f * n as f64 / 24e3).sin()).round() as f32;
-    let input: Vec<f32> =
-        (0..3000).flat_map(|n| [sample(n, 1e3), sample(n, 1.7e3)].map(|x| x / 32768.0)).collect();
-    std::fs::copy(fixture, desk.path("two.flac")).unwrap();
-    let report = desk.report(&["fuse", "bank.json", "two.flac", "-o", "y.wav", "--keep-latency"]);
-    assert_eq!(report["samples"], 6000);
-    assert!(wav::read(&desk.path("y.wav")).1 == fused(&input));
-    let page = desk.run(&["fuse", "bank.json", "two.flac", "-o", "y.flac"], &[]);
-    assert_eq!(page.status.code(), Some(2));
-}
-
 /// Complex frames of two channels, and their real and imaginary parts as real frames.
 fn complex(count: usize) -> (Vec<f32>, [Vec<f32>; 2]) {
     let parts = [frames(count), frames(count + 100)[200..].to_vec()];
     (interleaved(&parts[0], &parts[1]), parts)
-}
-
-#[test]
-fn complex_samples_run_through_both_parts() {
-    let desk = Desk::new();
-    let (input, parts) = complex(3000);
-    let want = interleaved(&fused(&parts[0]), &fused(&parts[1]));
-    let output = desk.run(&["stream", "bank.json", "--format", "cf32"], &bytes(&input));
-    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
-    assert!(floats(&output.stdout) == want);
-    // Integers, with clipping of either part counted.
-    let coded: Vec<u8> = input.iter().flat_map(|x| ((x * 8.0) as i16).to_be_bytes()).collect();
-    desk.write("coded", &coded);
-    let args = ["stream", "bank.json", "--input", "coded", "--format", "cs16be", "-o", "out"];
-    let report = desk.report(&[&args[..], &["--output-format", "cf32le"]].concat());
-    assert_eq!((report["samples"].as_u64(), report["clipped"].as_u64()), (Some(6000), Some(0)));
-    let scaled: Vec<f32> = want.iter().map(|y| y / 4096.0).collect();
-    assert!(floats(&desk.read("out")) == scaled);
-    let real = [&args[..], &["--force", "--output-format", "cf32"]].concat();
-    let real: Vec<&str> = real.iter().map(|&arg| if arg == "cs16be" { "s16be" } else { arg }).collect();
-    desk.refused(2, &real, &["--output-format", "real"]);
 }
 
 #[test]
@@ -204,40 +133,6 @@ fn complex_recordings_are_fused() {
     desk.refused(1, &mixed, &["0.sigmf-meta: complex samples, and 1.sigmf-meta holds real ones"]);
     let report: Value = desk.report(&["fuse", "bank.json", "both.npy", "-o", "x.wav", "--threads", "2"]);
     assert_eq!(report["samples"], 1000);
-}
-
-/// A tone as whole numbers of a converter, with `middle` for 0, one per line.
-fn codes(middle: i32) -> String {
-    let code = |k: u32| middle + (100.0 * (0.7 * f64::from(k)).sin()).round() as i32;
-    (0..4096).map(|k| format!("{}\n", code(k))).collect()
-}
-
-#[test]
-fn full_scale_of_tables_is_stated_or_warned_of() {
-    let desk = Desk::new();
-    desk.write("signed.txt", codes(0));
-    desk.write("unsigned.dat", codes(128));
-    let figures = |args: &[&str]| {
-        let args = [&["measure", "--rate", "1MHz", "--json"][..], args].concat();
-        serde_json::from_str::<Value>(&text(&desk.run(&args, &[]).stdout)).unwrap()
-    };
-    let level = 20.0 * (100.0f64 / 128.0).log10();
-    for args in [
-        &["signed.txt", "--full-scale", "8bits"][..],
-        &["signed.txt", "--full-scale", "128"],
-        &["unsigned.dat", "--full-scale", "u8bits"],
-        &["signed.txt", "--format", "csv", "--full-scale", "128"],
-    ] {
-        let found = figures(args);
-        let tone = found["tones"][0]["level_dbfs"].as_f64().unwrap();
-        assert!((tone - level).abs() < 0.01, "{args:?}: {tone}");
-        assert!(found["offset"]["value"].as_f64().unwrap().abs() < 1e-3, "{args:?}");
-    }
-    for (file, scale) in [("signed.txt", "8bits"), ("unsigned.dat", "u8bits")] {
-        let run = desk.run(&["measure", "--rate", "1MHz", file], &[]);
-        let warning = text(&run.stderr);
-        assert!(warning.contains(file) && warning.contains(&format!("full scale of {scale}")), "{warning}");
-    }
 }
 
 #[test]

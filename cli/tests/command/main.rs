@@ -13,7 +13,6 @@ mod band;
 mod bit_true;
 mod calibrate;
 mod converter_errors;
-mod cuts;
 mod design;
 mod docs;
 mod doors;
@@ -36,7 +35,6 @@ mod messages;
 mod notes;
 #[cfg(unix)]
 mod outputs;
-mod pooled;
 mod rates;
 mod report;
 mod schema;

@@ -51,63 +51,6 @@ fn numbers_are_short() {
     assert_eq!(format!("{:.2} {:.1}", Number(0.126), Number(1.26e99)), "0.13 1.3e99");
 }
 
-#[test]
-fn the_words_of_serde_become_plain_ones() {
-    for (message, words) in [
-        ("missing field `global` at line 1 column 2", "line 1, column 2: the key global is missing"),
-        (
-            "invalid type: string \"a, expected b\", expected u64 at line 3 column 9",
-            "line 3, column 9: expected a whole number, zero or more, without point and exponent, found the text \"a, expected b\"",
-        ),
-        ("invalid type: floating point `1e300.0`, expected a string", "expected a text, found 1e300.0"),
-        (
-            "invalid type: floating point `0.5`, expected usize",
-            "expected a whole number, zero or more, without point and exponent, found 0.5",
-        ),
-        ("invalid type: map, expected a sequence", "expected a list, found a table"),
-        (
-            "invalid value: integer `-3`, expected u64",
-            "expected a whole number, zero or more, without point and exponent, found -3",
-        ),
-        ("invalid length 1, expected an array of length 2", "1 entries, but a list of 2 is needed"),
-        (
-            "unknown variant `b`, expected `first` or `second`",
-            "unknown name \"b\"; the names here are first, second",
-        ),
-        (
-            "unknown field `b\u{1b}`, expected one of `first`, `length`",
-            "unknown key \"b\\u{1b}\"; the keys here are first, length",
-        ),
-        ("unknown field `b`, expected `first`", "unknown key \"b\"; the keys here are first"),
-        ("EOF while parsing an object at line 2 column 0", "line 2, column 0: the text ends inside a table"),
-        (
-            "recursion limit exceeded at line 1 column 128",
-            "line 1, column 128: lists and tables are nested too deeply",
-        ),
-        ("cannot recurse further; max recursion depth met", "lists and tables are nested too deeply"),
-        (
-            "number out of range at line 1 column 15",
-            "line 1, column 15: a number does not fit a double; write one below 1e308",
-        ),
-        (
-            "unexpected end of hex escape at line 1 column 14",
-            "line 1, column 14: a text has a backslash that begins no character of JSON",
-        ),
-        (
-            "control character (\\u0000-\\u001F) found while parsing a string at line 1 column 4",
-            "line 1, column 4: a text has a line break or another control character; write \\n or \\u and four \
-             digits",
-        ),
-        ("EOF while parsing a value at line 1 column 0", "it is empty"),
-        ("invalid type: sequence, expected a map at line 1 column 0", "expected a table, found a list"),
-        ("expected `,` or `}` at line 1 column 7", "line 1, column 7: expected `,` or `}`"),
-    ] {
-        assert_eq!(of_json(message), words);
-    }
-    let huge = format!("invalid type: floating point `1{}.0`, expected u64", "0".repeat(300));
-    assert!(of_document(&huge).ends_with("found 1e300"), "{}", of_document(&huge));
-}
-
 proptest! {
     #[test]
     fn nothing_foreign_reaches_the_terminal(text in any::<String>(), times in 1usize..100) {

@@ -12,7 +12,6 @@ use std::ops::{Range, RangeInclusive};
 use std::rc::Rc;
 
 /// What the Riccati solver in doubles takes for rounding.
-#[derive(Debug, Clone, Copy)]
 struct Settings {
     /// A feedthrough below this fraction of its measurement is a rounding error: the channel adds no
     /// information.
@@ -72,7 +71,7 @@ pub(in crate::design) struct Innovations {
     delayed: Vec<DelayedChannel>,
     channels: usize,
     /// Feedthrough of the channel with the least, given the channels before it, relative to its size.
-    least_feedthrough: f64,
+    pub(super) least_feedthrough: f64,
     /// The result "impossible" may be accepted: the coordinates are balanced and no channel is left out.
     conclusive: bool,
     /// The map to the plant's own coordinates, and the same there, where the columns of the delay chains
@@ -193,11 +192,6 @@ impl Innovations {
     /// Whether the feedthrough of a channel is rounding, so that the channel was left out.
     fn leaves_out_a_channel(&self) -> bool {
         self.least_feedthrough <= SETTINGS.innovation_floor
-    }
-
-    /// Feedthrough of the channel with the least, relative to its size.
-    pub(super) fn least_feedthrough(&self) -> f64 {
-        self.least_feedthrough
     }
 
     /// F P0 F' - P0: what the substitution adds to Q.

@@ -12,7 +12,6 @@ use crate::lti::peak::{Peak, hinf_norm};
 use std::rc::Rc;
 
 /// What gamma-iteration tolerates. The shares are of [`GAMMA_ACCURACY`], the accuracy that is promised.
-#[derive(Debug, Clone, Copy)]
 struct Settings {
     /// What a computed norm may exceed the gamma that a filter was promised for. It adds up to less than
     /// one with the bracket.

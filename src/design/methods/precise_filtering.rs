@@ -31,7 +31,6 @@ use nalgebra::DMatrix as Matrix;
 use std::ops::Range;
 
 /// What the solver of extended precision takes for rounding.
-#[derive(Debug, Clone, Copy)]
 struct Settings {
     /// Rounding moves no eigenvalue of a scaled semidefinite matrix this far below zero.
     semidefinite: f64,

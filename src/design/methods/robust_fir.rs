@@ -22,7 +22,6 @@ use crate::spec::{ErrorBox, Method, Spec};
 use crate::units::Seconds;
 
 /// What a robust design tolerates.
-#[derive(Debug, Clone, Copy)]
 struct Settings {
     /// A nominal bank whose largest gain is within this of a lower bound is kept: nobody sees 0.01 dB.
     no_gain: f64,
@@ -93,9 +92,9 @@ pub(crate) fn synthesise(
 fn study_of(nominal: &Synthesis, search: &BoxSearch) -> Result<RobustStudy, DesignError> {
     let worst = search.worst(&nominal.filters)?;
     // Whatever the taps, each combination of errors alone has the error that no bank avoids.
-    let unavoidable = search.plant().moved(&worst.point).noncausal_bound()?.gain;
+    let unavoidable = search.plant.moved(&worst.point).noncausal_bound()?.gain;
     let norms = RobustNorms { nominal: nominal.peak.gain, largest_found: worst.peak.gain };
-    let errors = search.plant().errors.in_seconds(search.plant().fast_period());
+    let errors = search.plant.errors.in_seconds(search.plant.problem.fast_period);
     Ok(RobustStudy {
         errors,
         robust: norms,
@@ -155,8 +154,8 @@ impl AffineError for BoxError {
     type Scenario = Combination;
 
     fn at(&self, location: &GridFrequency<Combination>) -> FrequencyPoint {
-        let response = self.search.plant().response(location.frequency);
-        let h = self.search.plant().measurements(&response, &location.scenario);
+        let response = self.search.plant.response(location.frequency);
+        let h = self.search.plant.measurements(&response, &location.scenario);
         let count = h.nrows();
         let g = linalg::lq_factor(&linalg::vstack(&[&h, &response.references]));
         let rows = |first: usize, rows: usize| -> CMat {
@@ -180,7 +179,7 @@ fn exchange(
     let noise = plant.problem().noise.clone();
     let margin = settings.gamma_margin.unwrap_or(SETTINGS.norm_margin).max(SETTINGS.norm_margin);
     let problem = SampledProblem::new(points, lags);
-    let without_errors = std::iter::repeat(vec![0; search.plant().errors.delays.len()]);
+    let without_errors = std::iter::repeat(vec![0; search.plant.errors.delays.len()]);
     let error = BoxError { search, inputs: plant.channels() + plant.ratio() };
     let objective = MeanSquareObjective { weights, noise };
     let mut exchange = Exchange::new(error, problem, without_errors, objective, margin);

@@ -21,7 +21,6 @@ use crate::verify::{EnclosedErrorSystem, Midpoint, ZERO_NORM};
 use nalgebra::DMatrix as Matrix;
 
 /// What the search for a certificate tolerates.
-#[derive(Debug, Clone, Copy)]
 struct Settings {
     /// Part of the excess that white noise on the states may take there: it leaves nearly all to the
     /// certificate.

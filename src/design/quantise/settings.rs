@@ -1,7 +1,6 @@
 //! What the search for integer taps tolerates.
 
 /// What the search for integer taps tolerates.
-#[derive(Debug, Clone, Copy)]
 pub(super) struct Settings {
     /// Fraction of the weights that a round replaces: with all of them the worst frequency would jump to
     /// and fro.

@@ -1,7 +1,6 @@
 //! What order reduction takes for rounding.
 
 /// What order reduction takes for rounding.
-#[derive(Debug, Clone, Copy)]
 pub(super) struct Settings {
     /// States below this share of the output are rounding errors of the Gramians.
     pub(super) rounding_share: f64,

@@ -19,7 +19,6 @@ use crate::spec::ErrorPoint;
 use std::cell::OnceCell;
 
 /// What the search of a box tolerates.
-#[derive(Debug, Clone, Copy)]
 struct Settings {
     /// A step that raises the gain by less (relative) ends the climb: what is left of it is rounding.
     least_step: f64,
@@ -60,7 +59,7 @@ struct Attained {
 
 /// The search over one box.
 pub(in crate::design) struct BoxSearch {
-    plant: BoxPlant,
+    pub(in crate::design) plant: BoxPlant,
     frequencies: Frequencies,
     responses: Vec<OnceCell<BoxResponse>>,
     corners: Vec<Combination>,
@@ -76,14 +75,9 @@ impl BoxSearch {
         lags: usize,
         resonances: &[f64],
     ) -> Result<Self, DesignError> {
-        let frequencies = Frequencies::new(lags, &[&plant.resonances()?, resonances].concat());
+        let frequencies = Frequencies::new(lags, &[&plant.plant.resonances()?, resonances].concat());
         let responses = frequencies.all.iter().map(|_| OnceCell::new()).collect();
         Ok(Self { corners: plant.corners(), plant, frequencies, responses })
-    }
-
-    /// The front ends.
-    pub(in crate::design) fn plant(&self) -> &BoxPlant {
-        &self.plant
     }
 
     /// Makes the errors of `point` a combination; see [`BoxPlant::include`].
@@ -103,8 +97,8 @@ impl BoxSearch {
             let peak = self.plant.moved(&point).bank_norm(filters)?;
             Ok::<_, DesignError>(WorstErrors { point, peak })
         };
-        let without_errors = at(ErrorPoint::none(self.plant.options().len()))?;
-        let response = FilterResponse::new(filters, self.plant.ratio())?;
+        let without_errors = at(ErrorPoint::none(self.plant.options.len()))?;
+        let response = FilterResponse::new(filters, self.plant.plant.ratio())?;
         self.worst_points(&response)?.into_iter().try_fold(without_errors, |worst, point| {
             let other = at(point)?;
             Ok(if other.peak.gain > worst.peak.gain { other } else { worst })
@@ -157,7 +151,7 @@ impl BoxSearch {
     /// frequencies are left out.
     fn sweep(&self, filters: &FilterResponse, level: f64) -> Result<Vec<Vec<Attained>>, DesignError> {
         let mut all: Vec<Vec<Attained>> = vec![Vec::new(); self.frequencies.all.len()];
-        let mut carried = vec![vec![0; self.plant.options().len()]];
+        let mut carried = vec![vec![0; self.plant.options.len()]];
         for &k in &self.frequencies.first {
             let at = filters.at(self.frequencies.all[k]);
             let mut starts = self.worst_corners(self.response(k), &at)?;
@@ -219,7 +213,7 @@ impl BoxSearch {
         for Attained { mut gain, mut combination } in found.iter().cloned() {
             for i in 0..combination.len() {
                 let mut best = combination[i];
-                for choice in 0..self.plant.options()[i].len() {
+                for choice in 0..self.plant.options[i].len() {
                     combination[i] = choice;
                     let other = self.gain(response, &at, &combination)?;
                     if other > gain * (1.0 + SETTINGS.least_step) {
@@ -348,7 +342,7 @@ impl SingularPair {
         for i in 0..combination.len() {
             let own = combination[i];
             let mut best = (own, self.output(plant, combination));
-            for choice in 0..plant.options()[i].len() {
+            for choice in 0..plant.options[i].len() {
                 combination[i] = choice;
                 let output = self.output(plant, combination);
                 if output < best.1 {
@@ -363,7 +357,7 @@ impl SingularPair {
 
     /// Re (u* F H v).
     fn output(&self, plant: &BoxPlant, combination: &[usize]) -> f64 {
-        let chosen = |i: usize| plant.options()[i][combination[i]];
+        let chosen = |i: usize| plant.options[i][combination[i]];
         let term = |i: usize| {
             let gain = Complex::from(1.0 + chosen(i).gain);
             let of = |(column, row): (usize, usize)| (self.filters[column] * self.samples[row] * gain).re;

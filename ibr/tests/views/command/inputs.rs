@@ -2,7 +2,7 @@
 
 use super::*;
 use hybank_ibr::image::{MOST_PIXELS, read_image};
-use nalgebra::{Matrix3x4, Vector3};
+use nalgebra::Matrix3x4;
 
 const FOCAL: f64 = 108.0;
 
@@ -91,33 +91,6 @@ fn init_writes_the_place_of_a_view() {
     refused(dir.path(), &pair, 1, &["b.png", "shows no depth"]);
 }
 
-/// A camera path of nerfstudio and a transforms file with the same two cameras give the same films.
-#[test]
-fn lists_of_cameras_are_films() {
-    let dir = folder();
-    let write = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
-    write("test.json", &list(&[("0.png", 0.0), ("1.png", 0.3)], |_| String::new()));
-    write("path.json", &camera_path(&[0.0, 0.3]));
-    good(dir.path(), &["render", "set", "--cameras", "path.json", "-o", "path.png"]);
-    good(dir.path(), &["render", "set", "--cameras", "test.json", "-o", "test.png"]);
-    let size = |name: &str| read_image(&dir.path().join(name), MOST_PIXELS).unwrap();
-    let quality =
-        |a: &Image, b: &Image| hybank_ibr::image::quality::compare(a, b, None).unwrap().unwrap().psnr;
-    for number in ["0001", "0002"] {
-        let [a, b] = ["path", "test"].map(|name| size(&format!("{name}-{number}.png")));
-        // The focal length went through an angle.
-        assert!(quality(&a, &b) > 60.0, "{number}");
-    }
-    assert!(quality(&size("test-0001.png"), &size("truth.png")) > 30.0);
-    write("s.toml", "transforms = \"set/transforms.json\"\n[virtual]\ncameras = \"test.json\"\n");
-    good(dir.path(), &["render", "s.toml", "-o", "scene.png"]);
-    assert!(picture(dir.path(), "scene-0002.png") == picture(dir.path(), "test-0002.png"));
-    good(dir.path(), &["render", "set", "--cameras", "test.json", "-o", "film.y4m"]);
-    let both = ["render", "set", "--cameras", "test.json", "--view", "a.png", "-o", "x.png"];
-    refused(dir.path(), &both, 2, &["--cameras and --view"]);
-    refused(dir.path(), &["render", "set", "--cameras", "none.json", "-o", "x.png"], 1, &["none.json"]);
-}
-
 /// A thing that is in one photograph only, and that a mask or the alpha channel takes out.
 #[test]
 fn masked_pixels_are_unknown() {
@@ -179,60 +152,4 @@ fn a_view_without_a_map_takes_the_depths_of_the_others() {
     assert!(lacking > all - 3.5 && lacking > two + 3.0, "{all} {lacking} {two}");
     std::fs::write(dir.path().join("none.toml"), scene(&(view("a", false) + &view("b", false)))).unwrap();
     refused(dir.path(), &["render", "none.toml", "-o", "x.png"], 1, &["no `depth`", "\"matched\""]);
-}
-
-/// The surface that one view shows, as a mesh: depth of all views.
-#[test]
-fn depth_comes_from_a_mesh() {
-    let dir = folder();
-    let maps = psnr(dir.path(), &scene(""));
-    let (_, depth) = SyntheticScene::default().view(&camera(0.15), SIZE);
-    let (width, height) = SIZE;
-    let corner = |p: usize| -> Vector3<f64> {
-        camera(0.15).unproject((p % width) as f64, (p / width) as f64, f64::from(depth.data()[p]))
-    };
-    let corners: String =
-        (0..width * height).map(corner).map(|c| format!("{} {} {}\n", c.x, c.y, c.z)).collect();
-    let square = |p: usize| format!("4 {} {} {} {}\n", p, p + 1, p + width + 1, p + width);
-    let squares = (0..width * (height - 1)).filter(|p| (p + 1) % width != 0);
-    let faces: String = squares.map(square).collect();
-    let header = format!(
-        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
-        width * height,
-        (width - 1) * (height - 1)
-    );
-    std::fs::write(dir.path().join("mesh.ply"), header + &corners + &faces).unwrap();
-    let plain = list(&PLACES[..3], |_| String::new());
-    std::fs::write(dir.path().join("set/transforms.json"), plain).unwrap();
-    let meshed = psnr(dir.path(), &format!("depth = \"mesh.ply\"\n{}", scene("")));
-    // The mesh of one view joins what lies behind each other.
-    assert!(meshed > 36.0, "{maps} {meshed}");
-    std::fs::write(
-        dir.path().join("mesh.ply"),
-        "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nend_header\n1\n",
-    )
-    .unwrap();
-    refused(dir.path(), &["render", "s.toml", "-o", "x.png"], 1, &["mesh.ply", "vertex 1 of 2"]);
-}
-
-/// Windows writes backslashes into the names of COLMAP's images.
-#[test]
-fn names_of_colmap_have_backslashes() {
-    let dir = folder();
-    let at = |name: &str| dir.path().join(name);
-    std::fs::create_dir_all(at("w/images/cam")).unwrap();
-    std::fs::create_dir_all(at("w/sparse/0")).unwrap();
-    let (w, h) = SIZE;
-    let (cx, cy) = (w as f64 / 2.0, h as f64 / 2.0);
-    std::fs::write(at("w/sparse/0/cameras.txt"), format!("1 PINHOLE {w} {h} {FOCAL} {FOCAL} {cx} {cy}\n"))
-        .unwrap();
-    let line = |(k, (name, x)): (usize, &(&str, f64))| format!("{k} 1 0 0 0 {} 0 0 1 cam\\{name}\n\n", -x);
-    std::fs::write(at("w/sparse/0/images.txt"), PLACES[..3].iter().enumerate().map(line).collect::<String>())
-        .unwrap();
-    for (name, _) in &PLACES[..3] {
-        std::fs::copy(at("set").join(name), at("w/images/cam").join(name)).unwrap();
-    }
-    good(dir.path(), &["init", "w", "-o", "w.toml"]);
-    let written = std::fs::read_to_string(at("w.toml")).unwrap();
-    assert!(written.contains("w/images/cam/b.png"), "{written}");
 }

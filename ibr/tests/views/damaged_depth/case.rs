@@ -27,27 +27,18 @@ impl Case {
         Ok(Self { spec, path: path.into(), truth: read_image(truth, MOST_PIXELS)? })
     }
 
-    /// The view rendered with damaged maps, which are written into a folder.
-    pub(crate) fn rendered(&self, damage: Damage, folder: &Path) -> Result<Rendered, Box<dyn Error>> {
+    /// PSNR of the view rendered with damaged maps, which are written into a folder.
+    pub(crate) fn rendered(&self, damage: Damage, folder: &Path) -> Result<f64, Box<dyn Error>> {
         let spec = damage.applied(&self.spec, &self.path, folder)?;
         let options = LoadOptions { depth_step: damage.step(), ..LoadOptions::default() };
         let scene = scene::load(&spec, &self.path, &options)?;
-        let rendering = render(&scene)?;
-        let psnr = self.psnr(&rendering.image)?;
-        Ok(Rendered { psnr, coverage: rendering.coverage() })
+        self.psnr(&render(&scene)?.image)
     }
 
     /// PSNR of a view against the true one.
     pub(crate) fn psnr(&self, image: &Image) -> Result<f64, Box<dyn Error>> {
         Ok(quality::compare(image, &self.truth, None)?.map_or(f64::NAN, |q| q.psnr))
     }
-}
-
-/// Figures of a rendering.
-pub(crate) struct Rendered {
-    pub(crate) psnr: f64,
-    /// Share of the pixels that were seen.
-    pub(crate) coverage: f64,
 }
 
 fn render(scene: &Scene) -> Result<Rendering, RenderError> {

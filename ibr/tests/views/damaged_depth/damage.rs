@@ -31,12 +31,8 @@ pub(crate) enum Damage {
     Lattice,
     /// There are no maps: the depths are found from the photographs.
     Matched,
-    /// What is infinitely far away has this value.
-    Sky(f32),
     /// Red, green and blue of the second photograph have these factors.
     Exposure([f64; 3]),
-    /// What is infinitely far away is unknown, and of the rest this share is known.
-    ScatteredSky(f64),
 }
 
 impl Damage {
@@ -53,8 +49,6 @@ impl Damage {
             }
             Self::Lattice => "lattice 2.8 %".into(),
             Self::Matched => "matched".into(),
-            Self::ScatteredSky(share) => format!("scattered {} %, nothing in the sky", 100.0 * share),
-            Self::Sky(value) => format!("sky as {value:e}"),
             Self::Exposure(gains) => format!("exposure {gains:?}"),
         }
     }
@@ -131,8 +125,6 @@ impl Damage {
                 Self::ScatteredOutliers(_, wrong) if uniform(random) < wrong => {
                     *value = low + (high - low) * uniform(random) as f32;
                 }
-                Self::ScatteredSky(share) if value.is_infinite() || uniform(random) >= share => *value = 0.0,
-                Self::Sky(far) if value.is_infinite() => *value = far,
                 _ => {}
             }
         }
