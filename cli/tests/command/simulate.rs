@@ -74,7 +74,6 @@ fn a_recording_is_a_source() {
     desk.refused(1, &["simulate", "spec.toml", "--source", "none.wav", "-o", "c2"], &["none.wav"]);
 }
 
-/// Two captures of a speech recording with the wanted signal, made elsewhere in the frequency domain.
 /// Complex numbers of little-endian 32-bit floats.
 fn complex(bytes: &[u8]) -> Vec<[f64; 2]> {
     let number = |bytes: &[u8]| f64::from(f32::from_le_bytes(bytes.try_into().unwrap()));
