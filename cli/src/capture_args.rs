@@ -56,7 +56,7 @@ impl CaptureArgs {
     pub(super) fn typed(&self) -> String {
         let format = (self.format != Coding::Wav).then(|| format!(" --format {}", self.format));
         let channels = self.channels.map(|channels| format!(" --channels {channels}"));
-        let scale = self.scale.given().map(|scale| format!(" --full-scale {scale}"));
+        let scale = self.scale.full_scale.map(|scale| format!(" --full-scale {scale}"));
         let channel = self.channel.map(|channel| format!(" --channel {channel}"));
         let iq = self.iq.then(|| " --iq".to_owned());
         let table = Some(self.table.typed());
@@ -82,7 +82,7 @@ impl CaptureArgs {
             channels: self.channels.map(usize::from),
             only: self.channel.map(|channel| usize::from(channel) - 1),
             is_iq: self.iq,
-            full_scale: self.scale.given(),
+            full_scale: self.scale.full_scale,
             table: self.table.options(),
         }
     }
@@ -106,25 +106,7 @@ pub(super) struct ScaleArgs {
     /// words of any size, or a number (128, 2.5) [default: that of WAV and FLAC files, else that of the spec
     /// or its bits, else all bits of integers, or 1]
     #[arg(long, value_name = "X", value_parser = quantity::full_scale)]
-    full_scale: Option<FullScale>,
-    /// Bits of the converters: --full-scale 12bits is the same as 12
-    #[arg(long, value_name = "B", value_parser = codes, conflicts_with = "full_scale")]
-    sample_bits: Option<FullScale>,
-}
-
-/// Signed codes of so many bits.
-fn codes(bits: &str) -> Result<FullScale, String> {
-    let scale = quantity::full_scale(&format!("{}bits", bits.trim())).ok();
-    scale
-        .filter(|scale| matches!(scale, FullScale::Signed(_)))
-        .ok_or_else(|| "give the bits of a converter, 1 to 53; for codes from 0 --full-scale u8bits".into())
-}
-
-impl ScaleArgs {
-    /// The full scale, if it is given.
-    pub(super) fn given(self) -> Option<FullScale> {
-        self.full_scale.or(self.sample_bits)
-    }
+    pub(super) full_scale: Option<FullScale>,
 }
 
 /// The option of the commands that read captures of a bank.

@@ -218,16 +218,16 @@ pub(super) fn print_report(report: &impl serde::Serialize, samples: &Path) -> Re
     Ok(())
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
 mod tests {
     use super::*;
-    use std::process::Command;
 
     #[test]
+    #[cfg(unix)]
     fn a_shell_reads_a_path_as_it_is() {
         for path in ["a/b.wav", "two words.wav", "it's $HOME; `ls` \"x\" \\ *", "größe.wav", "-o", "#1"] {
             let script = format!("printf %s {}", shell_word(Path::new(path)));
-            let output = Command::new("sh").args(["-c", &script]).output().unwrap();
+            let output = std::process::Command::new("sh").args(["-c", &script]).output().unwrap();
             let read = String::from_utf8(output.stdout).unwrap();
             assert_eq!(read.strip_prefix("./").filter(|_| path == "-o").unwrap_or(&read), path);
         }

@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 Examples:
   hybank report bank.json -o report.html
   hybank report bank.json ch1.wav ch2.wav -o report.html
-  hybank report quad.json codes.csv --interleaved 4 --sample-bits 8 -o report.html")]
+  hybank report quad.json codes.csv --interleaved 4 --full-scale 8bits -o report.html")]
 pub(super) struct Args {
     /// The bank (JSON)
     bank: PathBuf,

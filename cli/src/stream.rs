@@ -140,7 +140,7 @@ impl Args {
             channels,
             only: None,
             is_iq: false,
-            full_scale: self.scale.given(),
+            full_scale: self.scale.full_scale,
             table: self.table.options(),
         };
         let mut reader = job.start_reader(inputs, format, &mut |stall| observer.stalled(stall))?;

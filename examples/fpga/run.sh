@@ -38,7 +38,7 @@ iverilog -g2001 -P core_tb.INPUT='"captures.txt"' -P core_tb.EXPECTED='"wanted.t
     -P core_tb.FRAMES=16384 -P core_tb.OUTPUT='"rtl.csv"' -o captures core.v core_tb.v
 vvp captures
 
-for what in float.wav integer.wav "rtl.csv --rate 1e9 --sample-bits 16"; do
+for what in float.wav integer.wav "rtl.csv --rate 1e9 --full-scale 16bits"; do
     echo "${what%%.*}"
     hybank measure $what --tone 183.1MHz --interleaved 4 --skip 200
 done

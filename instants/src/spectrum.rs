@@ -55,11 +55,6 @@ impl Spectrum {
     pub fn longest(&self) -> FastPeriods {
         self.longest
     }
-
-    /// The end of the band.
-    pub fn highest(&self) -> CyclesPerFastPeriod {
-        self.nodes.last().map_or(CyclesPerFastPeriod(0.0), |node| node.frequency)
-    }
 }
 
 fn piece(

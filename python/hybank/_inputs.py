@@ -49,7 +49,7 @@ def _are_files(x):
 
 @checked
 def read(
-    files, *, bank=None, format="wav", channels=None, channel=None, iq=False, full_scale=None, sample_bits=None,
+    files, *, bank=None, format="wav", channels=None, channel=None, iq=False, full_scale=None,
     interleaved=None, lost=None, max_lost=None, longest=False, skip_lines=0, columns=None, time_column=None, delimiter=None,
     decimal=None
 ):
@@ -71,8 +71,6 @@ def read(
         Pairs of channels are the real and the imaginary parts of complex samples.
     full_scale : float or str, optional
         Full scale of the converters: a number, or "12bits", "u12bits". WAV and FLAC state it, the bank may.
-    sample_bits : int, optional
-        The same as ``full_scale="<B>bits"``.
     interleaved : int, optional
         One recording of one channel in which so many converters take turns; needs `bank`.
     lost : str or os.PathLike, optional
@@ -104,10 +102,6 @@ def read(
     >>> captures.channels.shape, bank.fuse(captures).shape
     ((2, 200), (400,))
     """
-    if sample_bits is not None:
-        if full_scale is not None:
-            raise HybankError("sample_bits and full_scale are the same; give one of them")
-        full_scale = f"{sample_bits}bits"
     if interleaved is not None and bank is None:
         raise HybankError("interleaved: give the bank, whose delays say in which order the converters take turns")
     options = {

@@ -388,8 +388,7 @@ impl Bank {
 }
 
 /// The formats by name.
-const FORMATS: [(&str, Exported); 8] = [
-    ("c99", Exported::C99),
+const FORMATS: [(&str, Exported); 7] = [
     ("c", Exported::C99),
     ("csv", Exported::Csv),
     ("mat", Exported::Mat),

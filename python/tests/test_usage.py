@@ -31,7 +31,7 @@ with bank.stream(axis=0) as s:
     sink(s.flush())
 cap = hb.simulate(bank, "chirp:50Hz..8kHz@1s"); p = hb.verify("bank.json"); a = hb.analyze(bank, delay_error=[1e-9, 0])
 m = hb.measure(y, rate)
-bank.export("fir.h", format="c99")
+bank.export("fir.h", format="c")
 """
 
 

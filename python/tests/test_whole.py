@@ -299,7 +299,7 @@ def test_taps_of_another_tool_are_judged(bank, tmp_path):
     with pytest.raises(hb.HybankError, match="^latency: "):
         hb.import_taps(SPEC.replace("latency = 6\n", ""), bank.taps)
     bank.export(tmp_path / "a.h", format="c")
-    bank.export(tmp_path / "b.h", format="c99")
+    bank.export(tmp_path / "b.h", format="c")
     assert (tmp_path / "a.h").read_bytes() == (tmp_path / "b.h").read_bytes()
 
 

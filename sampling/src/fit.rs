@@ -11,10 +11,8 @@
 //! an addition). The normal equations have half bandwidth n = ORDER - 1 and are solved by an LDL^T
 //! factorisation without fill-in: O(M n^2) for any number of right-hand sides.
 
-mod influence;
 mod roughness;
 
-pub use influence::Response;
 pub use roughness::PosteriorCovariance;
 
 use super::SamplingError;

@@ -14,21 +14,36 @@ use super::AnalogError;
 use super::roots::RootSet;
 use super::square_free::{SquareFreeFactor, square_free_factors};
 
-/// Relative error of a coefficient of a square-free factor.
-const COEFFICIENT_ERROR: f64 = 2.0 * Float512::ROUNDING;
+/// What the search for roots tolerates.
+struct Settings {
+    /// Relative error of a coefficient of a square-free factor: two roundings.
+    coefficient_error: f64,
+    /// Relative correction from which the next approximation has all its digits, because each step triples
+    /// them.
+    converged_correction: f64,
+    /// Relative change of the first approximations by which they lose their symmetry: two real ones could
+    /// not become a conjugate pair otherwise.
+    asymmetry: f64,
+    /// Imaginary part over modulus of an approximation to a real root, far above the rounding of 512 bits.
+    /// The discs decide whether it is real.
+    real_root_tolerance: f64,
+    /// Covers the rounding of the radii, which are computed with some hundred operations of 512 bits and
+    /// then rounded to doubles.
+    outward: f64,
+}
+
+/// Of every polynomial.
+const SETTINGS: Settings = Settings {
+    coefficient_error: 2.0 * Float512::ROUNDING,
+    converged_correction: 1e-70,
+    asymmetry: 1e-10,
+    real_root_tolerance: 1e-100,
+    outward: 1.0 + 1e-12,
+};
+
 /// Most steps of [`refined`]. From eigenvalues in doubles three are enough; the further ones are for
 /// clusters, to which the eigenvalues are poor approximations.
 const MAX_STEPS: usize = 100;
-/// Relative correction from which the next approximation has all its digits, because each step triples them.
-const CONVERGED_CORRECTION: f64 = 1e-70;
-/// Relative change of the first approximations by which they lose their symmetry: two real ones could not
-/// become a conjugate pair otherwise.
-const ASYMMETRY: f64 = 1e-10;
-/// Imaginary part over modulus of an approximation to a real root. The discs decide whether it is real.
-const REAL_ROOT_TOLERANCE: f64 = 1e-100;
-/// Covers the rounding of the radii, which are computed with some hundred operations of 512 bits and then
-/// rounded to doubles.
-const OUTWARD: f64 = 1.0 + 1e-12;
 
 type LongComplex = Cartesian<Float512>;
 
@@ -60,7 +75,7 @@ pub(super) fn isolated(p: &[Float512]) -> Option<RootSet<LongBall>> {
     let radii: Vec<f64> = (0..centres.len()).map(|i| radius(p, &centres, i)).collect();
     for (i, &z) in centres.iter().enumerate() {
         for (j, &other) in centres.iter().enumerate().take(i) {
-            let apart = modulus(z - other).nearest() > (radii[i] + radii[j]) * OUTWARD;
+            let apart = modulus(z - other).nearest() > (radii[i] + radii[j]) * SETTINGS.outward;
             if !apart {
                 return None;
             }
@@ -91,7 +106,7 @@ fn approximate_roots(p: &[Float512]) -> Option<Vec<LongComplex>> {
     });
     let eigenvalues = linalg::eigenvalues(&companion).ok()?;
     let turned = |(i, z): (usize, Complex<f64>)| {
-        let z = z * Complex::from_polar(1.0 + ASYMMETRY * i as f64, ASYMMETRY);
+        let z = z * Complex::from_polar(1.0 + SETTINGS.asymmetry * i as f64, SETTINGS.asymmetry);
         LongComplex::new(Float512::from(z.re).scaled(unit), Float512::from(z.im).scaled(unit))
     };
     Some(eigenvalues.into_iter().enumerate().map(turned).collect())
@@ -109,7 +124,7 @@ fn refined(p: &[Float512], mut roots: Vec<LongComplex>) -> Vec<LongComplex> {
                 roots[i] = z - step;
             }
             // NaN compares as not settled.
-            settled &= size <= CONVERGED_CORRECTION * modulus(z).nearest();
+            settled &= size <= SETTINGS.converged_correction * modulus(z).nearest();
         }
         if settled {
             break;
@@ -146,7 +161,8 @@ fn modulus(z: LongComplex) -> Float512 {
 /// The approximations with exact symmetry: real roots on the axis, the others in conjugate pairs. `None` if
 /// some have no partner.
 fn symmetric(roots: Vec<LongComplex>) -> Option<Vec<LongComplex>> {
-    let is_real = |z: &LongComplex| z.im.nearest().abs() <= REAL_ROOT_TOLERANCE * modulus(*z).nearest();
+    let is_real =
+        |z: &LongComplex| z.im.nearest().abs() <= SETTINGS.real_root_tolerance * modulus(*z).nearest();
     let (real_ones, others): (Vec<LongComplex>, Vec<LongComplex>) = roots.into_iter().partition(is_real);
     let (upper, lower): (Vec<LongComplex>, Vec<LongComplex>) =
         others.into_iter().partition(|z| z.im.nearest() > 0.0);
@@ -162,7 +178,7 @@ fn radius(p: &[Float512], centres: &[LongComplex], i: usize) -> f64 {
     let denominator = others.fold(p[0], |product, (_, &other)| product * modulus(z - other));
     let size = residual(p, z) * Float512::from(centres.len() as f64);
     // What is no double is rounded up.
-    (size / denominator).nearest().abs() * OUTWARD + f64::MIN_POSITIVE
+    (size / denominator).nearest().abs() * SETTINGS.outward + f64::MIN_POSITIVE
 }
 
 /// A bound of |p(z)|. It is computed in the unit of |z|, in which no power of z leaves the range of doubles.
@@ -174,7 +190,7 @@ fn residual(p: &[Float512], z: LongComplex) -> Float512 {
     let coefficient = |k: usize| {
         let x = p[k].scaled(power(k) - size);
         // The second number covers what is no double.
-        Ball::exactly(x).widened(COEFFICIENT_ERROR * x.nearest().abs() + f64::MIN_POSITIVE)
+        Ball::exactly(x).widened(SETTINGS.coefficient_error * x.nearest().abs() + f64::MIN_POSITIVE)
     };
     let point = ComplexBall::new(Ball::exactly(z.re.scaled(-unit)), Ball::exactly(z.im.scaled(-unit)));
     let value =

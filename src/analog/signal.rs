@@ -10,23 +10,40 @@ use super::{AnalogError, StableFilter};
 use crate::spec::{Band, Family, FilterSpec, Passband, SignalSpec, SignalSpectrum, Spec};
 use crate::units::Hertz;
 
-/// Ripple of W over the band.
-const RIPPLE_DB: f64 = 1.0;
-/// The stop edge of a low-pass W over the end of the band, where the samples resolve so much.
-const STOP_EDGE: f64 = 1.35;
-/// Distance of the stop edges of a band-pass W from the band, over its width.
-const SKIRT: f64 = 0.175;
+/// The shape of W.
+struct Settings {
+    /// Ripple of W over the band: figures hold for a flat band, and less ripple costs poles.
+    ripple_db: f64,
+    /// The stop edge of a low-pass W over the end of the band, where the samples resolve so much.
+    stop_edge: f64,
+    /// Distance of the stop edges of a band-pass W from the band, over its width: half of that of a
+    /// low-pass on each side.
+    skirt: f64,
+    /// Bits of converters for which the lowest of [`FLOORS_DB`] is enough.
+    bits_of_least_floor: f64,
+    /// Decibels of floor per bit beyond: more than the 6 dB by which the noise of the converters falls.
+    floor_per_bit_db: f64,
+    /// The least floor for which a sharp edge is kept. A band that leaves less room ends at or beyond what
+    /// the samples resolve.
+    least_floor_db: f64,
+}
+
+/// Of every W.
+const SETTINGS: Settings = Settings {
+    ripple_db: 1.0,
+    stop_edge: 1.35,
+    skirt: 0.175,
+    bits_of_least_floor: 8.0,
+    floor_per_bit_db: 10.0,
+    least_floor_db: 10.0,
+};
+
 /// Most poles of a low-pass W, and of the prototype of a band-pass W. A sharper filter has more states than
 /// its floor is worth.
 const MOST_POLES: usize = 12;
 const MOST_PROTOTYPE_POLES: usize = 8;
 /// Floors by the noise of the converters: 10 dB per bit from 8 bits on, and never outside these.
 const FLOORS_DB: [f64; 2] = [40.0, 80.0];
-const BITS_OF_LEAST_FLOOR: f64 = 8.0;
-const FLOOR_PER_BIT_DB: f64 = 10.0;
-/// The least floor for which a sharp edge is kept. A band that leaves less room ends at or beyond what the
-/// samples resolve.
-const LEAST_FLOOR_DB: f64 = 10.0;
 
 /// The written filter W of a signal.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,7 +84,7 @@ impl SignalFilter {
     /// The elliptic filter for `band`; `resolved` is f_N, the width of the band that the samples resolve.
     fn of_band(band: Band, resolved: Hertz, floor_db: f64) -> Self {
         let elliptic = |transition: f64, most: usize| {
-            let shape = Selectivity { ripple_db: RIPPLE_DB, transition };
+            let shape = Selectivity { ripple_db: SETTINGS.ripple_db, transition };
             let order = shape.order_for(floor_db).min(most);
             (order, floor_db.min(shape.attenuation_of(order)))
         };
@@ -81,7 +98,7 @@ impl SignalFilter {
             family: Family::Elliptic,
             order: Some(order),
             passband: passband(band),
-            ripple_db: Some(RIPPLE_DB),
+            ripple_db: Some(SETTINGS.ripple_db),
             attenuation_db: Some(floor_db),
         };
         Self { filter, floor_db: Some(floor_db) }
@@ -108,12 +125,12 @@ fn usual_floor(spec: &Spec) -> f64 {
     let quietest = spec.channels.iter().map(|channel| channel.sample_noise()).fold(f64::INFINITY, f64::min);
     // A converter of b bits has the noise 2^(1 - b) / sqrt(12).
     let bits = 1.0 - (quietest * 12f64.sqrt()).log2();
-    (least + FLOOR_PER_BIT_DB * (bits - BITS_OF_LEAST_FLOOR)).clamp(least, most)
+    (least + SETTINGS.floor_per_bit_db * (bits - SETTINGS.bits_of_least_floor)).clamp(least, most)
 }
 
 /// The stop edge over the end of the band: the wanted one, and the one for a band that leaves no room.
 fn low_pass_transitions(band: Band, resolved: Hertz) -> [f64; 2] {
-    [STOP_EDGE.min(resolved / band.high), STOP_EDGE]
+    [SETTINGS.stop_edge.min(resolved / band.high), SETTINGS.stop_edge]
 }
 
 /// The frequency of the prototype to which the nearer stop edge belongs: clipped to the zone in which the
@@ -126,7 +143,7 @@ fn band_pass_transitions(band: Band, resolved: Hertz) -> [f64; 2] {
         // At and below zero frequency there is nothing to suppress.
         if below > 0.0 { prototype(below).min(prototype(above)) } else { prototype(above) }
     };
-    let (below, above) = (low - SKIRT * width, high + SKIRT * width);
+    let (below, above) = (low - SETTINGS.skirt * width, high + SETTINGS.skirt * width);
     let zone = (0.5 * (low + high) / resolved.0).floor();
     let [first, last] = [zone, zone + 1.0].map(|edge| edge * resolved.0);
     let clipped = if first <= low && high <= last { nearer(below.max(first), above.min(last)) } else { 0.0 };
@@ -140,7 +157,8 @@ fn passband(Band { low, high }: Band) -> Passband {
 /// The first of `transitions` that leaves a floor.
 fn sharpest(transitions: [f64; 2], elliptic: impl Fn(f64) -> (usize, f64)) -> (usize, f64) {
     let [wanted, wide] = transitions;
-    let kept = (wanted > 1.0).then(|| elliptic(wanted)).filter(|(_, floor)| *floor >= LEAST_FLOOR_DB);
+    let kept =
+        (wanted > 1.0).then(|| elliptic(wanted)).filter(|(_, floor)| *floor >= SETTINGS.least_floor_db);
     kept.unwrap_or_else(|| elliptic(wide))
 }
 

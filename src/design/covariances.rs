@@ -14,14 +14,22 @@ use crate::lti::gramian::controllability_root;
 use crate::units::FastPeriods;
 use std::f64::consts::TAU;
 
-/// Deviations beyond which a Gaussian counts as zero: 2e-19 of its power lies outside.
-const GAUSSIAN_REACH: f64 = 9.0;
-/// Panels grow by this factor from the kink on, where fast poles still matter.
-const PANEL_GROWTH: f64 = 1.5;
-/// Least width of a panel over the deviation. Oscillations that are faster average out.
-const LEAST_PANEL: f64 = 1.0 / 256.0;
-/// Share of the power of a sample below which the difference of two covariances loses the digits of jitter.
-const RESOLVED_SHARE: f64 = 1e-9;
+/// How the integrals of the covariances are cut.
+struct Settings {
+    /// Deviations beyond which a Gaussian counts as zero: 2e-19 of its power lies outside.
+    gaussian_reach: f64,
+    /// Panels grow by this factor from the kink on, where fast poles still matter.
+    panel_growth: f64,
+    /// Least width of a panel over the deviation. Oscillations that are faster average out.
+    least_panel: f64,
+    /// Share of the power of a sample below which the difference of two covariances loses the digits of
+    /// jitter.
+    resolved_share: f64,
+}
+
+/// Of every integral.
+const SETTINGS: Settings =
+    Settings { gaussian_reach: 9.0, panel_growth: 1.5, least_panel: 1.0 / 256.0, resolved_share: 1e-9 };
 
 /// The covariances of all front ends of a problem.
 pub(crate) struct Covariances {
@@ -42,7 +50,7 @@ impl Covariances {
         let joint = JointState::new(problem);
         let (transition, input) = joint.over(problem.ratio as f64);
         let root = controllability_root(&transition, &input)?;
-        let slopes = joint.slopes() * &root;
+        let slopes = &joint.slopes * &root;
         let mut poles = problem.signal.as_ref().map_or(Ok(Vec::new()), |w| linalg::eigenvalues(w.a()))?;
         for front_end in &problem.front_ends {
             poles.extend(linalg::eigenvalues(front_end.a())?);
@@ -68,7 +76,7 @@ impl Covariances {
         }
         let power = self.power(front_end);
         let difference = self.averaged_change(front_end, deviation.0);
-        if difference > RESOLVED_SHARE * power {
+        if difference > SETTINGS.resolved_share * power {
             return difference;
         }
         difference.max(self.slopes[front_end] * deviation.0 * deviation.0)
@@ -79,7 +87,7 @@ impl Covariances {
         let (output, power) = (self.joint.c().row(front_end), self.power(front_end));
         let density = |t: f64| (-0.5 * (t / deviation).powi(2)).exp() * 2.0 / (deviation * TAU.sqrt());
         let (mut time, mut state, mut sum) = (0.0, self.inputs.column(front_end).into_owned(), 0.0);
-        for width in self.panels(deviation, GAUSSIAN_REACH * deviation) {
+        for width in self.panels(deviation, SETTINGS.gaussian_reach * deviation) {
             for (part, share) in GAUSS_LEGENDRE {
                 let covariance = (output * (self.joint.transition(part * width) * &state))[0];
                 sum += share * width * density(time + part * width) * 2.0 * (power - covariance);
@@ -95,13 +103,13 @@ impl Covariances {
         let fastest = |part: fn(&Complex<f64>) -> f64| self.poles.iter().map(part).fold(0.0, f64::max);
         let (size, oscillation) = (fastest(|pole| pole.norm()), fastest(|pole| pole.im.abs()));
         let within = |rate: f64| deviation.min(1.0 / rate);
-        let widest = within(oscillation).max(LEAST_PANEL * deviation);
+        let widest = within(oscillation).max(SETTINGS.least_panel * deviation);
         let (mut widths, mut covered, mut width) = (Vec::new(), 0.0, within(size).min(widest));
         while covered < length {
             let next = width.min(length - covered);
             widths.push(next);
             covered += next;
-            width = (PANEL_GROWTH * width).min(widest);
+            width = (SETTINGS.panel_growth * width).min(widest);
         }
         widths
     }

@@ -13,6 +13,25 @@ use crate::lti::peak::{Peak, local_maxima, refine};
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
+/// What the grid takes for one frequency, one gain or no peak.
+pub(super) struct Settings {
+    /// Around points below this share of a level there is no peak above the level: see [`STRIDE`].
+    pub(super) prune_level: f64,
+    /// Relative change of a gain at which the refinement of a peak between grid points ends: below the
+    /// accuracy of gamma, so that the peaks that become points are those of the error.
+    pub(super) flat_gain: f64,
+    /// Further frequencies closer to an equidistant one than this share of their distance are left out:
+    /// their errors are the same.
+    pub(super) least_share: f64,
+    /// Frequencies closer than this are one point, in radians: rows of the problem that differ by rounding
+    /// help nobody.
+    pub(super) least_distance: f64,
+}
+
+/// Of every grid.
+pub(super) const SETTINGS: Settings =
+    Settings { prune_level: 0.96, flat_gain: 1e-8, least_share: 1e-6, least_distance: 1e-7 };
+
 /// Grid intervals for each slow lag: enough for the mean square of a polynomial of that degree to be exact.
 const POINTS_PER_LAG: usize = 3;
 /// Least number of these intervals: front ends have a memory, too.
@@ -23,16 +42,6 @@ const FINE: usize = 8;
 /// them, pi / (6 lags) apart, the gain falls from a maximum by 1 % at most (M. Riesz: cos(lags t / 2) with
 /// t = pi / (12 lags)), and the memory of the front ends adds some.
 const STRIDE: usize = FINE / 2;
-/// Prune level: around points below this share of a level there is no peak above the level.
-pub(super) const PRUNE_LEVEL: f64 = 0.96;
-/// Relative change of a gain at which the refinement of a peak between grid points ends: below the accuracy
-/// of gamma, so that the peaks that become points are those of the error.
-const FLAT_GAIN: f64 = 1e-8;
-/// Further frequencies closer to an equidistant one than this share of their distance are left out.
-const LEAST_SHARE: f64 = 1e-6;
-
-/// Frequencies closer than this are one point, in radians.
-const LEAST_DISTANCE: f64 = 1e-7;
 
 /// Errors `K(omega) = W(omega) - sum_j e^{-i omega j} F_j H(omega)`, affine in the unknowns `F_j`: one for
 /// each scenario, all with the same unknowns.
@@ -58,7 +67,7 @@ pub(super) struct GridFrequency<S> {
 
 impl<S: PartialEq> GridFrequency<S> {
     pub(super) fn is_near(&self, other: &Self) -> bool {
-        (self.frequency - other.frequency).abs() <= LEAST_DISTANCE && self.scenario == other.scenario
+        (self.frequency - other.frequency).abs() <= SETTINGS.least_distance && self.scenario == other.scenario
     }
 }
 
@@ -104,7 +113,7 @@ impl Frequencies {
         let uniform = (0..=intervals).map(|k| PI * k as f64 / intervals as f64);
         let is_new = |omega: &f64| {
             let place = omega * intervals as f64 / PI;
-            (0.0..=PI).contains(omega) && (place - place.round()).abs() > LEAST_SHARE
+            (0.0..=PI).contains(omega) && (place - place.round()).abs() > SETTINGS.least_share
         };
         let mut all: Vec<f64> = uniform.clone().chain(further.iter().copied().filter(is_new)).collect();
         all.sort_by(f64::total_cmp);
@@ -184,7 +193,7 @@ impl<'a> ErrorGrid<'a> {
             let error = self.plant.at(frequency).error(&taps.response(frequency));
             Ok(Peak { gain: gain(&error)?, frequency })
         };
-        local_maxima(&grid).into_iter().map(|around| refine(at, around, FLAT_GAIN)).collect()
+        local_maxima(&grid).into_iter().map(|around| refine(at, around, SETTINGS.flat_gain)).collect()
     }
 
     fn error(&self, k: usize, taps: &FirMatrix) -> CMat {

@@ -28,21 +28,36 @@ use crate::lmi::FINEST_GAP;
 use crate::lmi::sampled::{self, FrequencyPoint, LowerBound, MeanSquareObjective, SampledProblem};
 use crate::lti::FirMatrix;
 
+/// What the exchange tolerates.
+pub(super) struct Settings {
+    /// Least relative margin of gamma for the secondary objective. Optimal unknowns are not unique, so even
+    /// this margin lets the mean square improve.
+    pub(super) least_margin: f64,
+    /// Tolerance of the optimum on the points, relative to the accuracy of gamma: little of it, as most is
+    /// needed for the peaks between them.
+    pub(super) points_accuracy: f64,
+    /// Excess of a peak over the optimum on the points, relative to the accuracy of gamma, from which it
+    /// becomes a point: beyond the tolerance of that optimum.
+    pub(super) peak_excess: f64,
+    /// Fraction of the margin that the secondary objective may use at the points. The rest is left to the
+    /// peaks between them.
+    pub(super) margin_at_points: f64,
+    /// Share of the distance between the largest peak and the bound to which the next problem is solved: a
+    /// closer solution would change with the next points.
+    pub(super) share_of_width: f64,
+}
+
+/// Of every exchange.
+pub(super) const SETTINGS: Settings = Settings {
+    least_margin: 4e-7,
+    points_accuracy: 0.1,
+    peak_excess: 0.2,
+    margin_at_points: 0.75,
+    share_of_width: 0.3,
+};
+
 /// Relative width of the interval `[lower, gamma]` at which the exchange ends.
 pub(crate) const GAMMA_ACCURACY: f64 = 5e-7;
-/// Least relative margin of gamma for the secondary objective. Optimal unknowns are not unique, so even
-/// this margin lets the mean square improve.
-pub(super) const LEAST_MARGIN: f64 = 4e-7;
-/// Tolerance of the optimum on the points, relative to the accuracy of gamma.
-const POINTS_ACCURACY: f64 = 0.1;
-/// Excess of a peak over the optimum on the points, relative to the accuracy of gamma, from which it becomes
-/// a point.
-const PEAK_EXCESS: f64 = 0.2;
-/// Fraction of the margin that the secondary objective may use at the points. The rest is left to the peaks
-/// between them.
-const MARGIN_AT_POINTS: f64 = 0.75;
-/// Share of the distance between the largest peak and the bound to which the next problem is solved.
-const SHARE_OF_WIDTH: f64 = 0.3;
 
 /// The tolerance schedule: how closely the problems of the rounds are solved.
 #[derive(Debug, Clone, Copy)]
@@ -62,7 +77,7 @@ pub(super) struct Tolerances {
 impl Tolerances {
     /// Every problem as closely as the last one, for few rounds: five are rarely needed.
     fn steady(accuracy: f64) -> Self {
-        let loosest = POINTS_ACCURACY * accuracy;
+        let loosest = SETTINGS.points_accuracy * accuracy;
         Self { accuracy, loosest, mean_square: FINEST_GAP, active: 0.0, rounds: 16 }
     }
 
@@ -73,12 +88,12 @@ impl Tolerances {
     }
 
     fn finest(&self) -> f64 {
-        POINTS_ACCURACY * self.accuracy
+        SETTINGS.points_accuracy * self.accuracy
     }
 
     /// Of a problem whose predecessor left an interval of this relative width.
     fn tolerance(&self, width: f64) -> f64 {
-        (SHARE_OF_WIDTH * width).min(self.loosest).max(self.finest())
+        (SETTINGS.share_of_width * width).min(self.loosest).max(self.finest())
     }
 }
 
@@ -124,7 +139,7 @@ pub(super) struct Exchange<E: AffineError> {
 impl<E: AffineError> Exchange<E> {
     /// Starts from the points of `problem`, which belong to these scenarios. `objective` has a weight for
     /// each of them, `gamma_margin` is the relative excess of gamma granted to it, at least
-    /// [`LEAST_MARGIN`].
+    /// [`Settings::least_margin`].
     pub(super) fn new(
         error: E,
         problem: SampledProblem,
@@ -136,7 +151,7 @@ impl<E: AffineError> Exchange<E> {
         let located =
             frequencies.zip(scenarios).map(|(frequency, scenario)| GridFrequency { frequency, scenario });
         let locations = located.collect();
-        let gamma_margin = gamma_margin.max(LEAST_MARGIN);
+        let gamma_margin = gamma_margin.max(SETTINGS.least_margin);
         Self {
             error,
             problem,
@@ -218,7 +233,7 @@ impl<E: AffineError> Exchange<E> {
         self.raise_lower_bound(solution.lower);
         // The optimum lies anywhere between the two.
         let optimum = if tolerance > tolerances.finest() { self.lower } else { solution.gamma };
-        let level = optimum * (1.0 + PEAK_EXCESS * tolerances.accuracy);
+        let level = optimum * (1.0 + SETTINGS.peak_excess * tolerances.accuracy);
         let candidate = self.judge(solution.taps, solution.gamma, level)?;
         Ok(Round { candidate, is_solved: solution.is_solved })
     }
@@ -258,7 +273,7 @@ impl<E: AffineError> Exchange<E> {
         tolerances: Tolerances,
     ) -> Result<TapCandidate<E::Scenario>, DesignError> {
         let cap = start.estimate * (1.0 + self.gamma_margin);
-        let cap_at_points = start.estimate * (1.0 + MARGIN_AT_POINTS * self.gamma_margin);
+        let cap_at_points = start.estimate * (1.0 + SETTINGS.margin_at_points * self.gamma_margin);
         for _ in 0..tolerances.rounds {
             if self.stop.is_due() {
                 return Ok(start);

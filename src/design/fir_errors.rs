@@ -32,7 +32,7 @@ pub(super) struct FirErrors {
     root: RootCovariance,
     ratio: usize,
     channels: usize,
-    longest: usize,
+    pub(super) longest: usize,
     latencies: RangeInclusive<usize>,
 }
 
@@ -49,11 +49,6 @@ impl FirErrors {
         let instants = -(*latencies.end() as i64)..=(ratio as i64 - 1 - *latencies.start() as i64);
         let root = RootCovariance::new(problem, deviations, most.div_ceil(ratio), instants);
         Self { root, ratio, channels, longest: most, latencies }
-    }
-
-    /// The longest length.
-    pub(super) fn longest(&self) -> usize {
-        self.longest
     }
 
     /// The mean square of the target, the error of a bank that outputs zeros.

@@ -246,7 +246,7 @@ fn fewest(most: usize, suffice: impl Fn(usize) -> Result<bool, DesignError>) -> 
 
 /// The least mean square of all lengths and latencies.
 fn least(errors: &FirErrors) -> f64 {
-    errors.square(errors.best(errors.longest()))
+    errors.square(errors.best(errors.longest))
 }
 
 fn decibels(power_ratio: f64) -> f64 {

@@ -110,7 +110,7 @@ pub(super) struct JointState {
     b: Mat,
     c: Mat,
     /// C A: the derivatives of the outputs, as far as the state determines them.
-    slopes: Mat,
+    pub(super) slopes: Mat,
 }
 
 impl JointState {
@@ -146,11 +146,6 @@ impl JointState {
     /// e^{A l}.
     pub(super) fn transition(&self, length: f64) -> Mat {
         self.transition.over(length)
-    }
-
-    /// C A: the derivatives of the outputs, as far as the state determines them.
-    pub(super) fn slopes(&self) -> &Mat {
-        &self.slopes
     }
 
     /// (e^{A l}, S) of a segment of length l: x <- e^{A l} x + S w with S S* = G(l).

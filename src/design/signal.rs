@@ -8,19 +8,33 @@ use crate::units::RadiansPerFastPeriod;
 use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
 
-/// Fast rates up to which every alias of an unbounded signal counts by itself.
-const ALL_UP_TO: f64 = 8.0;
-/// The same for ratios above [`LARGE_RATIO`].
-const ALL_UP_TO_LARGE: f64 = 2.0;
+/// Which aliases of an unbounded signal count.
+struct Settings {
+    /// Fast rates up to which every alias of an unbounded signal counts by itself: there the front ends
+    /// change fast.
+    all_up_to: f64,
+    /// The same for ratios above [`LARGE_RATIO`], which have many aliases in a fast rate.
+    all_up_to_large: f64,
+    /// Beyond, one alias stands for a block of this share of its number: front ends are smooth there.
+    alias_block_share: f64,
+    /// Aliases are counted up to this multiple of the largest pole. A front end of one pole passes 6e-5 of
+    /// its power above, 0.0003 dB.
+    beyond_poles: f64,
+    /// Where in its block an alias lies: the fractional parts of multiples of the golden ratio, so that
+    /// products of channels with different delays average out.
+    golden: f64,
+}
+
+/// Of every signal.
+const SETTINGS: Settings = Settings {
+    all_up_to: 8.0,
+    all_up_to_large: 2.0,
+    alias_block_share: 0.1,
+    beyond_poles: 1e4,
+    golden: 0.618_033_988_749_894_9,
+};
+
 const LARGE_RATIO: usize = 16;
-/// Beyond, one alias stands for a block of this share of its number: front ends are smooth there.
-const ALIAS_BLOCK_SHARE: f64 = 0.1;
-/// Aliases are counted up to this multiple of the largest pole. A front end of one pole passes 6e-5 of its
-/// power above, 0.0003 dB.
-const BEYOND_POLES: f64 = 1e4;
-/// Where in its block an alias lies: the fractional parts of multiples of the golden ratio, so that products
-/// of channels with different delays average out.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// A signal that reaches the samples of a problem.
 #[derive(Debug, Clone)]
@@ -163,17 +177,17 @@ fn aliases_in(band: &RangeInclusive<f64>, theta: f64, period: f64) -> Vec<Alias>
 
 /// All aliases of an unbounded signal that count.
 fn aliases(problem: &Problem) -> Vec<Alias> {
-    let rates = if problem.ratio > LARGE_RATIO { ALL_UP_TO_LARGE } else { ALL_UP_TO };
+    let rates = if problem.ratio > LARGE_RATIO { SETTINGS.all_up_to_large } else { SETTINGS.all_up_to };
     let direct = (rates * problem.ratio as f64).ceil();
     let poles = problem.front_ends.iter().flat_map(|filter| filter.poles());
     let fastest = poles.map(|pole| pole.norm()).fold(0.0, f64::max);
-    let last = (BEYOND_POLES * fastest / TAU * problem.ratio as f64).max(direct);
+    let last = (SETTINGS.beyond_poles * fastest / TAU * problem.ratio as f64).max(direct);
     let mut found: Vec<Alias> =
         (0..=2 * direct as i64).map(|k| Alias { number: k as f64 - direct, count: 1.0 }).collect();
     let (mut start, mut place) = (direct + 1.0, 0.0_f64);
     while start <= last {
-        let count = (ALIAS_BLOCK_SHARE * start).ceil();
-        place = (place + GOLDEN).fract();
+        let count = (SETTINGS.alias_block_share * start).ceil();
+        place = (place + SETTINGS.golden).fract();
         let number = start + (place * count).floor();
         found.extend([Alias { number, count }, Alias { number: -number, count }]);
         start += count;

@@ -10,21 +10,30 @@ use crate::units::{CyclesPerFastPeriod, RadiansPerFastPeriod};
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Grid points for each peak that filters of a given length may have in a band.
-const PER_PEAK: f64 = 8.0;
+/// How the worst tone is searched.
+struct Settings {
+    /// Grid points for each peak that filters of a given length may have in a band: a refinement begins
+    /// beside its top.
+    per_peak: f64,
+    /// Multiply-adds that the grid may take: about a second.
+    most_work: f64,
+    /// A tone between two points of the grid is worse than theirs from this factor on: below, rounding
+    /// would choose.
+    worse_factor: f64,
+    /// The target counts as zero below this share of its largest gain in the band: 120 dB.
+    vanishing: f64,
+}
+
+/// Of every search.
+const SETTINGS: Settings =
+    Settings { per_peak: 8.0, most_work: 1e9, worse_factor: 1.0 + 1e-9, vanishing: 1e-6 };
+
 /// Fewest and most points of the grid.
 const POINTS: std::ops::RangeInclusive<f64> = 400.0..=20_000.0;
-/// Multiply-adds that the grid may take, about: a second.
-const MOST_WORK: f64 = 1e9;
 /// Local peaks of the grid that are refined, the largest ones.
 const REFINED: usize = 8;
 /// Steps of the golden section: the interval shrinks by 1e-8.
 const STEPS: usize = 40;
-/// A tone between two points of the grid is worse than theirs from this factor on: below, rounding would
-/// choose.
-const WORSE_FACTOR: f64 = 1.0 + 1e-9;
-/// The target counts as zero below this share of its largest gain in the band: 120 dB.
-const VANISHING: f64 = 1e-6;
 
 /// The output of a bank for the tone e^{j w t}. With the responses F_i of the filters at the fast rate
 ///
@@ -112,7 +121,7 @@ impl ToneResponse {
     pub(crate) fn worst(&self, band: [CyclesPerFastPeriod; 2]) -> Worst {
         let grid = self.grid(band);
         let largest = grid.iter().map(|tone| tone.target).fold(0.0, f64::max);
-        let counts = |tone: &ToneOutput| tone.target > VANISHING * largest;
+        let counts = |tone: &ToneOutput| tone.target > SETTINGS.vanishing * largest;
         let value =
             |of: fn(&ToneOutput) -> f64| move |tone: &ToneOutput| if counts(tone) { of(tone) } else { 0.0 };
         Worst {
@@ -127,8 +136,8 @@ impl ToneResponse {
         let period = self.problem.ratio as f64;
         let work = self.filters.lags() * self.problem.ratio * self.problem.channels.len();
         let peaks = (high.0 - low.0) * self.filters.lags() as f64 * period;
-        let wanted = (PER_PEAK * peaks).clamp(*POINTS.start(), *POINTS.end());
-        let step = (high.0 - low.0) / wanted.min(MOST_WORK / work as f64).max(100.0).floor();
+        let wanted = (SETTINGS.per_peak * peaks).clamp(*POINTS.start(), *POINTS.end());
+        let step = (high.0 - low.0) / wanted.min(SETTINGS.most_work / work as f64).max(100.0).floor();
         let even = (0..=((high.0 - low.0) / step).round() as usize).map(|k| low.0 + step * k as f64);
         let turns = (low.0 * period).floor() as i64..=(high.0 * period).ceil() as i64;
         let breaks = self.filters.breaks();
@@ -172,7 +181,7 @@ impl ToneResponse {
             let (a, b) = (high - ratio * (high - low), low + ratio * (high - low));
             let [left, right] = [a, b].map(|f| self.at(f));
             for tone in [left, right] {
-                if value(&tone) > WORSE_FACTOR * value(&best) {
+                if value(&tone) > SETTINGS.worse_factor * value(&best) {
                     best = tone;
                 }
             }

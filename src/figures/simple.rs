@@ -26,17 +26,6 @@ pub enum SimpleWay {
     CubicSpline,
 }
 
-impl SimpleWay {
-    /// Its name in reports for programs.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::OneChannel => "one-channel",
-            Self::Interleaving => "interleaving",
-            Self::CubicSpline => "cubic-spline",
-        }
-    }
-}
-
 /// What a simple way gives.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct SimpleFigure {

@@ -56,7 +56,7 @@ impl WordSizes {
 #[derive(Debug, Clone)]
 pub struct BitTrue {
     pub(super) filters: IntegerFilters,
-    fraction_bits: i32,
+    pub(super) fraction_bits: i32,
     pub(super) words: WordSizes,
     /// The samples of the last `lags` frames, a ring.
     history: Vec<i64>,
@@ -85,11 +85,6 @@ impl BitTrue {
         let history = filters.resting.repeat(filters.taps.lags);
         let fraction_bits = integers.fraction_bits;
         Ok(Self { filters, fraction_bits, words, history, newest: 0, wraps: 0, saturated: 0 })
-    }
-
-    /// A tap is its integer times 2^-f.
-    pub(super) fn fraction_bits(&self) -> i32 {
-        self.fraction_bits
     }
 
     /// Bits of an accumulator that no sum can leave.

@@ -1,6 +1,7 @@
 //! Cholesky factors of Newton matrices, which an interior-point method makes as ill-conditioned as the
 //! machine precision allows.
 
+use super::settings::SETTINGS;
 use crate::linalg::{LinalgError, Mat, PositiveFactor};
 
 /// The Cholesky factor of a Newton matrix, scaled to a unit diagonal, with as small a diagonal shift as it
@@ -12,11 +13,6 @@ pub(super) struct RegularisedCholesky {
     factor: PositiveFactor,
 }
 
-/// First shift tried if the matrix is not positive definite, a few roundings of its unit diagonal, and the
-/// growth and limit of the next ones. Above the limit the direction would be that of another matrix.
-const SHIFT_FIRST: f64 = 1e-15;
-const SHIFT_GROWTH: f64 = 10.0;
-const SHIFT_LAST: f64 = 1e-6;
 /// Steps of iterative refinement against the unshifted matrix.
 const REFINEMENTS: usize = 2;
 
@@ -63,8 +59,8 @@ fn shifted_factor(matrix: &Mat) -> Result<(PositiveFactor, f64), LinalgError> {
         let shifted = matrix + Mat::from_diagonal_element(matrix.nrows(), matrix.ncols(), shift);
         match PositiveFactor::new(&shifted) {
             Ok(factor) => return Ok((factor, shift)),
-            Err(error) if shift >= SHIFT_LAST => return Err(error),
-            Err(_) => shift = (shift * SHIFT_GROWTH).max(SHIFT_FIRST),
+            Err(error) if shift >= SETTINGS.shift_last => return Err(error),
+            Err(_) => shift = (shift * SETTINGS.shift_growth).max(SETTINGS.shift_first),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What the interior-point methods share: their loop and their step rule.
 
+use super::settings::SETTINGS;
 use crate::linalg::LinalgError;
 
 /// Relative duality gap that is as small as rounding errors allow.
@@ -7,20 +8,9 @@ pub const FINEST_GAP: f64 = 1e-9;
 
 /// Maximum number of predictor-corrector steps.
 const MOST_STEPS: usize = 80;
-/// Duality gap that counts as zero, relative to the size of the data: the largest `sigma_max(W_l)`.
-pub(super) const GAP_OF_ZERO: f64 = 1e-13;
-/// Combinations of unknowns whose effect is below this, relative to the largest, are dropped in the
-/// least-squares start.
-pub(super) const RANK_TOLERANCE: f64 = 1e-11;
-/// Largest fraction of the way to the boundary of the cone that a step goes.
-const STEP_FRACTION: f64 = 0.98;
-/// A gap below this share of the least one so far is progress.
-const PROGRESS_SHARE: f64 = 0.9;
 /// Steps without progress after which an iteration has stalled. The gap of a hard problem does not shrink in
 /// every step.
 const PATIENCE: usize = 6;
-/// Steps shorter than this part of a Newton step make no progress.
-const SHORTEST_STEP: f64 = 1e-7;
 /// Bounds of Mehrotra's centering: a step always aims inside of the cone, and always lowers the gap.
 const CENTERING: [f64; 2] = [1e-8, 0.9];
 
@@ -34,14 +24,14 @@ pub(super) struct StepLengths {
 impl StepLengths {
     /// Whether such a step moves the iterate.
     pub(super) fn make_progress(self) -> bool {
-        !self.primal.is_nan() && !self.dual.is_nan() && self.primal.max(self.dual) >= SHORTEST_STEP
+        !self.primal.is_nan() && !self.dual.is_nan() && self.primal.max(self.dual) >= SETTINGS.shortest_step
     }
 }
 
 /// The fraction of the way to the boundary that a step goes: the closer, the longer the steps of the
 /// predictor were (Mehrotra).
 pub(super) fn fraction(predicted: StepLengths) -> f64 {
-    STEP_FRACTION.min(0.9 + 0.09 * predicted.primal.min(predicted.dual).min(1.0))
+    SETTINGS.step_fraction.min(0.9 + 0.09 * predicted.primal.min(predicted.dual).min(1.0))
 }
 
 /// Mehrotra's centering, from the ratio of the gap that the predictor leaves to the present one.
@@ -79,7 +69,7 @@ pub(super) fn run(
         if gap <= tol_gap_rel && iterate.judged_gap()? <= tol_gap_rel {
             return Ok((true, steps));
         }
-        waited = if gap < PROGRESS_SHARE * least { 0 } else { waited + 1 };
+        waited = if gap < SETTINGS.progress_share * least { 0 } else { waited + 1 };
         least = least.min(gap);
         if waited > PATIENCE || iterate.step().is_none() {
             break;

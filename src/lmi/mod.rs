@@ -12,6 +12,7 @@
 mod factor;
 mod iteration;
 pub mod sampled;
+mod settings;
 #[cfg(test)]
 #[path = "../../tests/support/testbank.rs"]
 mod testbank;

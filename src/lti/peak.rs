@@ -10,36 +10,23 @@
 //! are the imaginary eigenvalues of one Hamiltonian matrix. Eigenvalues only *suggest* frequencies. Each
 //! reported value is evaluated from the response itself and refined between its neighbours.
 
-use super::refine::{FLAT_GAIN, higher, upper_estimate};
 pub(crate) use super::refine::{Peak, local_maxima, refine};
+use super::refine::{SETTINGS, higher, upper_estimate};
 use super::{FrequencyResponse, LtiError, StateSpace};
 use crate::linalg::{self, CMat, Complex, Scalar};
 use nalgebra::DMatrix;
 use std::f64::consts::PI;
 
-/// Relative accuracy of the returned peak.
-pub(crate) const PEAK_ACCURACY: f64 = 1e-9;
 /// Distances from the angle of a pole, relative to the distance of the pole from the unit circle.
 const WIDTHS: [f64; 5] = [-1.5, -0.5, 0.0, 0.5, 1.5];
 
-/// Limit on the rounds. The level rises at least by [`PEAK_ACCURACY`] in each; in practice two or three
+/// Limit on the rounds. The level rises at least by [`Settings::accuracy`] in each; in practice two or three
 /// rounds suffice.
 const ROUND_LIMIT: usize = 60;
 /// Uniform initial frequencies.
 const FIRST_GRID: usize = 32;
 /// At least so many uniform frequencies per state: |G|^2 has at most a peak for each state between 0 and pi.
 const FREQUENCIES_PER_STATE: usize = 2;
-/// Frequencies closer than this count as equal.
-const SAME_FREQUENCY: f64 = 1e-9;
-/// How far off the axis (relative) an eigenvalue may lie and still count as a crossing.
-const ON_AXIS: f64 = 1e-5;
-/// As [`ON_AXIS`], for frequencies that are only suggested. If the level almost touches a peak, two
-/// eigenvalues meet on the axis, and a rounding error of the matrix moves them by its square root. Errors
-/// of 1e-4 are common if the gain is small relative to terms that cancel. A false suggestion costs one
-/// evaluation; a missed one loses a peak.
-const NEAR_AXIS: f64 = 1e-2;
-/// A frequency whose gain is this close to the level (relative) is a bad centre of the Cayley transform.
-const NEAR_LEVEL: f64 = 1e-2;
 /// Number of frequencies tried for a better centre.
 const CENTRES: usize = 16;
 
@@ -88,13 +75,10 @@ pub(crate) fn stable_poles(system: &StateSpace) -> Result<Vec<Complex<f64>>, Lti
     if radius >= 1.0 { Err(LtiError::Unstable { radius }) } else { Ok(poles) }
 }
 
-/// Radius of a pole from which on it may cause a peak that the first grid misses.
-const RESONANT_RADIUS: f64 = 0.5;
-
 /// Angles of the poles that may cause a peak, and angles near them at multiples of the pole's distance from
 /// the unit circle, which is the width of its resonance.
 pub(crate) fn resonances(poles: &[Complex<f64>]) -> Vec<f64> {
-    let near = poles.iter().filter(|p| p.im >= 0.0 && p.norm() > RESONANT_RADIUS);
+    let near = poles.iter().filter(|p| p.im >= 0.0 && p.norm() > SETTINGS.resonant_radius);
     let about = |p: &Complex<f64>| WIDTHS.map(|width| p.arg() + width * (1.0 - p.norm()));
     near.flat_map(about).filter(|w| (0.0..=PI).contains(w)).collect()
 }
@@ -150,12 +134,12 @@ impl<'a> PeakSearch<'a> {
             if best.gain <= self.floor {
                 return Ok(best);
             }
-            match self.above(best.gain * (1.0 + PEAK_ACCURACY))? {
+            match self.above(best.gain * (1.0 + SETTINGS.accuracy))? {
                 None => return Ok(best),
                 Some(higher) => best = higher,
             }
         }
-        Err(LtiError::IterationLimit { what: "the level set", limit: ROUND_LIMIT, change: PEAK_ACCURACY })
+        Err(LtiError::IterationLimit { what: "the level set", limit: ROUND_LIMIT, change: SETTINGS.accuracy })
     }
 
     /// The highest local maximum. Each local maximum of the grid that may be the highest is refined.
@@ -169,7 +153,7 @@ impl<'a> PeakSearch<'a> {
             maxima.first().map_or(Peak { gain: 0.0, frequency: 0.0 }, |maximum| maximum[1].folded());
         for [low, middle, high] in maxima {
             if upper_estimate(low, middle, high) > best.gain {
-                best = higher(best, refine(|w| self.at(w), [low, middle, high], FLAT_GAIN)?);
+                best = higher(best, refine(|w| self.at(w), [low, middle, high], SETTINGS.flat_gain)?);
             }
         }
         Ok(best)
@@ -181,7 +165,7 @@ impl<'a> PeakSearch<'a> {
         let mut grid: Vec<f64> = (0..=intervals).map(|k| PI * k as f64 / intervals as f64).collect();
         grid.extend(&self.initial);
         grid.sort_by(f64::total_cmp);
-        grid.dedup_by(|b, a| *b - *a < SAME_FREQUENCY);
+        grid.dedup_by(|b, a| *b - *a < SETTINGS.same_frequency);
         grid.into_iter().map(|w| self.at(w)).collect()
     }
 
@@ -191,7 +175,7 @@ impl<'a> PeakSearch<'a> {
 
     /// A frequency with a gain above `level`, refined, if there is one.
     fn above(&self, level: f64) -> Result<Option<Peak>, LtiError> {
-        let crossings = self.crossings(level, NEAR_AXIS)?;
+        let crossings = self.crossings(level, SETTINGS.near_axis)?;
         let mut candidates = crossings.clone();
         candidates.extend(crossings.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])));
         let mut best = Peak { gain: level, frequency: f64::NAN };
@@ -203,18 +187,18 @@ impl<'a> PeakSearch<'a> {
         }
         let spread = 0.25 * PI / FIRST_GRID as f64;
         let (low, high) = (self.at(best.frequency - spread)?, self.at(best.frequency + spread)?);
-        refine(|w| self.at(w), [low, best, high], FLAT_GAIN).map(Some)
+        refine(|w| self.at(w), [low, best, high], SETTINGS.flat_gain).map(Some)
     }
 
     fn all_above(&self, level: f64) -> Result<Vec<Peak>, LtiError> {
-        let mut edges = self.crossings(level, ON_AXIS)?;
+        let mut edges = self.crossings(level, SETTINGS.on_axis)?;
         edges.dedup();
         let mut peaks = Vec::new();
         for range in edges.windows(2) {
             let start = self.at(0.5 * (range[0] + range[1]))?;
             if start.gain > level {
                 let (low, high) = (self.at(range[0])?, self.at(range[1])?);
-                let inside = refine(|w| self.at(w), [low, start, high], FLAT_GAIN)?;
+                let inside = refine(|w| self.at(w), [low, start, high], SETTINGS.flat_gain)?;
                 peaks.push(higher(inside, higher(low, high)));
             }
         }
@@ -265,7 +249,7 @@ impl<'a> PeakSearch<'a> {
         let distance = |w: f64| self.gain(w).map(|gain| (gain - level).abs());
         let (low, high) = (distance(0.0)?, distance(PI)?);
         let mut best = if high >= low { (high, PI) } else { (low, 0.0) };
-        if best.0 > NEAR_LEVEL * level {
+        if best.0 > SETTINGS.near_level * level {
             return Ok(best.1);
         }
         for k in 1..CENTRES {

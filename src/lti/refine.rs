@@ -2,20 +2,58 @@
 
 use std::f64::consts::PI;
 
-/// Where a refinement ends that nothing else limits: relative difference of gains.
-pub(super) const FLAT_GAIN: f64 = 1e-11;
-/// Gains with a relative difference below this count as equal.
-const EQUAL_GAINS: f64 = 1e-13;
-/// Frequencies closer than this are the same in doubles. A resonance may be that narrow, so its peak is not
-/// reached before.
-const LEAST_WIDTH: f64 = 4.0 * f64::EPSILON;
-/// Steps of a refinement are at least this part of the width that is left.
-const LEAST_STEP: f64 = 1e-3;
+/// What the search for peaks tolerates.
+pub(super) struct Settings {
+    /// Relative accuracy of the returned peak: far above the roundings of a gain, and far below what any
+    /// figure shows.
+    pub(super) accuracy: f64,
+    /// Frequencies closer than this count as equal: at a smooth peak their gains agree to all digits.
+    pub(super) same_frequency: f64,
+    /// How far off the axis (relative) an eigenvalue may lie and still count as a crossing: the roundings
+    /// of ordinary ones.
+    pub(super) on_axis: f64,
+    /// As [`Self::on_axis`], for frequencies that are only suggested. If the level almost touches a peak,
+    /// two eigenvalues meet on the axis, and a rounding error of the matrix moves them by its square root.
+    /// Errors of 1e-4 are common if the gain is small relative to terms that cancel. A false suggestion
+    /// costs one evaluation; a missed one loses a peak.
+    pub(super) near_axis: f64,
+    /// A frequency whose gain is this close to the level (relative) is a bad centre of the Cayley
+    /// transform.
+    pub(super) near_level: f64,
+    /// Radius of a pole from which on it may cause a peak that the first grid misses. That of a smaller one
+    /// is about a radian wide or more.
+    pub(super) resonant_radius: f64,
+    /// Relative difference of gains at which a refinement ends that nothing else limits: a hundredth of
+    /// [`Self::accuracy`].
+    pub(super) flat_gain: f64,
+    /// Gains with a relative difference below this count as equal: some hundred roundings.
+    pub(super) equal_gains: f64,
+    /// Frequencies closer than this are the same in doubles. A resonance may be that narrow, so its peak is
+    /// not reached before.
+    pub(super) least_width: f64,
+    /// Steps of a refinement are at least this part of the width that is left: a shorter one shows rounding
+    /// only.
+    pub(super) least_step: f64,
+}
+
+/// Of every search.
+pub(super) const SETTINGS: Settings = Settings {
+    accuracy: 1e-9,
+    same_frequency: 1e-9,
+    on_axis: 1e-5,
+    near_axis: 1e-2,
+    near_level: 1e-2,
+    resonant_radius: 0.5,
+    flat_gain: 1e-11,
+    equal_gains: 1e-13,
+    least_width: 4.0 * f64::EPSILON,
+    least_step: 1e-3,
+};
 
 /// A peak gain and where it is attained.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Peak {
-    /// The largest gain, with the relative accuracy `PEAK_ACCURACY`. It is
+    /// The largest gain, with a relative accuracy of 1e-9. It is
     /// attained at `frequency`, so it is never too large.
     pub gain: f64,
     /// Radians per step, in [0, pi].
@@ -40,7 +78,7 @@ pub(crate) fn refine<E>(
 ) -> Result<Peak, E> {
     let mut best = start;
     let (mut stalls, mut flats) = (0, 0);
-    while high.frequency - low.frequency > LEAST_WIDTH && flats < 2 {
+    while high.frequency - low.frequency > SETTINGS.least_width && flats < 2 {
         let w = next_abscissa(low, best, high, stalls);
         let tried = at(w)?;
         let gained = tried.gain - best.gain;
@@ -48,7 +86,7 @@ pub(crate) fn refine<E>(
         // A gain far below the best one shows a poor step, not convergence.
         flats = if gained.abs() <= flat * best.gain { flats + 1 } else { 0 };
         // Of equal gains the first stays, so that peaks at 0 and pi are exactly there.
-        if gained > EQUAL_GAINS * best.gain {
+        if gained > SETTINGS.equal_gains * best.gain {
             if w < best.frequency {
                 high = best
             } else {
@@ -64,7 +102,7 @@ pub(crate) fn refine<E>(
     Ok(best.folded())
 }
 
-/// Vertex of the parabola through three points, at least [`LEAST_STEP`] of their width away from the best
+/// Vertex of the parabola through three points, at least [`Settings::least_step`] of their width away from the best
 /// one (a shorter step finds the same gain up to rounding, wherever the peak is), or, where it is no use,
 /// a golden section of the longer side.
 fn next_abscissa(low: Peak, best: Peak, high: Peak, stalls: usize) -> f64 {
@@ -73,7 +111,7 @@ fn next_abscissa(low: Peak, best: Peak, high: Peak, stalls: usize) -> f64 {
     let (left, right) = ((m - a) * (best.gain - high.gain), (b - m) * (best.gain - low.gain));
     let step = -0.5 * ((m - a) * left - (b - m) * right) / (left + right);
     let longer = if m - a > b - m { a - m } else { b - m };
-    let least = LEAST_STEP * (b - a);
+    let least = SETTINGS.least_step * (b - a);
     let step = if step.abs() < least { least.copysign(longer) } else { step };
     let inside = m + step > a && m + step < b;
     if stalls % 3 < 2 && inside { m + step } else { m + GOLDEN * longer }

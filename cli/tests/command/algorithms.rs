@@ -107,27 +107,3 @@ fn stream_is_late_only_when_asked_to_be() {
     let (cut, _) = stream(&desk, &["--algorithm", "overlap-save"]);
     assert_eq!(cut, blocks[..2 * COUNT]);
 }
-
-#[test]
-fn masks_line_up_with_every_form() {
-    let desk = desk();
-    let gaps = ["--gaps", "--mask", "mask"];
-    let (direct, report) = fuse(&desk, &[&gaps[..], &["--algorithm", "direct"]].concat());
-    let (mask, list) = (desk.read("mask"), &report["gaps"]);
-    assert!(mask.iter().any(|mark| *mark > 0) && mask.contains(&0) && mask.len() == direct.len());
-    let (other, report) = fuse(&desk, &[&gaps[..], &["--algorithm", "overlap-save"]].concat());
-    same(&other, &direct);
-    assert_eq!((&desk.read("mask"), &report["gaps"]), (&mask, list));
-    // What is not touched has the very bits of a whole recording unless asked otherwise.
-    assert_eq!(fuse(&desk, &gaps).0, direct);
-
-    let (_, report) = stream(&desk, &[&gaps[..], &["--flush"]].concat());
-    let (mask, list) = (desk.read("mask"), &report["gaps"]);
-    assert_eq!(report["plan"]["algorithm"], "direct");
-    let (_, report) = stream(&desk, &[&gaps[..], &["--flush", "--algorithm", "overlap-save"]].concat());
-    let extra = report["plan"]["extra_latency"].as_u64().unwrap() as usize;
-    let late = desk.read("mask");
-    assert_eq!(report["gaps"], *list);
-    assert!(late[..extra].iter().all(|&mark| mark == 0));
-    assert_eq!(late[extra..], mask);
-}

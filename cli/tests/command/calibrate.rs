@@ -185,12 +185,11 @@ fn bits_of_codes_and_what_the_spec_fits() {
         let how = ["z.txt", "--interleaved", "4", "-o", "m.toml", "--json", "--force", "--tone", "61.3MHz"];
         desk.json(&[&["calibrate", spec], &how[..], more].concat())
     };
-    let bits = calibrated("spec.toml", &["--sample-bits", "12"]);
-    assert_eq!(bits["channels"], calibrated("spec.toml", &["--full-scale", "12bits"])["channels"]);
+    let bits = calibrated("spec.toml", &["--full-scale", "12bits"]);
     assert!((number(&bits, "/channels/1/offset/value") + 4.0 * STEP).abs() < 0.1 * STEP, "{bits}");
     desk.write("fit.toml", format!("full_scale = \"12bits\"\nfit = [\"gain\"]\n{NOMINAL}"));
     let gains = calibrated("fit.toml", &[]);
-    let told = calibrated("spec.toml", &["--sample-bits", "12", "--fit", "gain"]);
+    let told = calibrated("spec.toml", &["--full-scale", "12bits", "--fit", "gain"]);
     assert_eq!(gains["channels"], told["channels"]);
     assert!(gains["channels"][1]["delay"].is_null() && gains["channels"][1]["offset"].is_null(), "{gains}");
     assert!(!calibrated("fit.toml", &["--fit", "delay"])["channels"][1]["delay"].is_null());
@@ -199,12 +198,10 @@ fn bits_of_codes_and_what_the_spec_fits() {
         let how = ["calibrate", "spec.toml", "z.txt", "--interleaved", "4", "-o", "x.toml"];
         desk.refused(code, &[&how[..], more].concat(), parts);
     };
-    refused(&["--sample-bits", "u12"], 2, &["--sample-bits", "1 to 53", "--full-scale u8bits"]);
-    refused(&["--sample-bits", "12", "--full-scale", "8bits"], 2, &["cannot be used with"]);
-    refused(&["--sample-bits", "12", "--fit", "cutoff,cutoff:1"], 1, &["--fit", "keep one of them"]);
+    refused(&["--full-scale", "12bits", "--fit", "cutoff,cutoff:1"], 1, &["--fit", "keep one of them"]);
     // The lines that are there are named where a tone is missing.
     let missing = ["no tone found near 62300000 Hz", "the only line of the record appears at 613"];
-    refused(&["--sample-bits", "12", "--tone", "62.3MHz"], 1, &missing);
+    refused(&["--full-scale", "12bits", "--tone", "62.3MHz"], 1, &missing);
 }
 
 /// Codes from 0 on that are read as signed ones are beyond these, which the error says.
@@ -219,7 +216,7 @@ fn offset_binary_codes_are_named() {
         let done = desk.run(&[&how[..], scale].concat(), b"");
         (done.status.code(), text(&done.stderr))
     };
-    let (_, shown) = run(&["--sample-bits", "12"]);
+    let (_, shown) = run(&["--full-scale", "12bits"]);
     assert!(shown.contains("codes that count from 0 are u12bits"), "{shown}");
     assert_eq!(run(&["--full-scale", "u12bits"]), (Some(0), String::new()));
 }

@@ -4,60 +4,6 @@ use super::simulate::recording;
 use crate::support::{Desk, THESIS, number, wav};
 use serde_json::Value;
 
-/// Runs `simulate` on [`THESIS`] with a tone of 0.7 rad/s; returns the report and the captures.
-fn imperfect_captures(desk: &Desk, folder: &str, more: &[&str]) -> (Value, [Vec<f64>; 3]) {
-    let args =
-        ["simulate", "spec.toml", "--source", "tones:0.7", "-o", folder, "--samples", "40000", "--json"];
-    let report = desk.json(&[&args[..], more].concat());
-    let captures =
-        ["ch1.wav", "ch2.wav", "target.wav"].map(|name| recording(&desk.path(folder).join(name)).1);
-    (report, captures)
-}
-
-#[test]
-fn errors_of_the_converters_are_echoed_and_have_their_closed_form() {
-    let desk = Desk::with_spec(THESIS);
-    let errors = [
-        "--delay-error",
-        "10ms,-0.02samples",
-        "--gain-error",
-        "0.5%,-0.01",
-        "--offset",
-        "0.125",
-        "--drift",
-        "20,-30",
-        "--gain",
-        "0.5",
-    ];
-    let (report, captures) = imperfect_captures(&desk, "cap", &errors);
-    // Response of 0.25 / (s + 0.5)^2 to cos(0.7 t).
-    let response = |t: f64| 0.25 / (0.49 + 0.25) * (0.7 * t - 2.0 * (0.7f64 / 0.5).atan()).cos();
-    let truth = [(1.21, 1.005, 20.0), (0.58, 0.99, -30.0)];
-    for (i, (delay, gain, ppm)) in truth.into_iter().enumerate() {
-        for (key, want) in
-            [("delay", delay), ("gain", gain), ("offset", 0.125), ("drift", ppm), ("clipped", 0.0)]
-        {
-            let found = number(&report, &format!("/converters/{i}/{key}"));
-            assert!((found - want).abs() < 1e-12, "{key}: {found}");
-        }
-        for (k, x) in captures[i].iter().enumerate() {
-            let t = 2.0 * k as f64 / (1.0 + ppm * 1e-6) - delay;
-            let want = 0.5 * gain * response(t) + 0.125;
-            assert!((x - want).abs() < 1e-7, "channel {i}, sample {k}: {x} {want}");
-        }
-    }
-    assert_eq!(
-        (&report["bits"], number(&report, "/noise"), number(&report, "/jitter")),
-        (&Value::Null, 0.0, 0.0)
-    );
-    assert_eq!(number(&report, "/converters/1/delay_error"), -0.02);
-    assert_eq!(number(&report, "/converters/0/gain_error"), 0.005);
-    // The reference is that of an ideal converter.
-    for (n, x) in captures[2].iter().enumerate() {
-        assert!((x - 0.5 * response(n as f64)).abs() < 1e-7, "target {n}");
-    }
-}
-
 /// Cut-offs off by their errors are those of a spec that says so; with `fit` of one stage, of that stage.
 #[test]
 fn errors_of_cut_offs_are_those_of_other_front_ends() {

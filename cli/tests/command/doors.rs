@@ -65,20 +65,6 @@ fn words_with_unused_bits_draw_a_warning_and_codes_beyond_are_refused() {
     desk.refused(1, &[&refused[..], &["--full-scale", "10bits"]].concat(), &parts);
 }
 
-/// Half of the codes stand at the ends of the range.
-#[test]
-fn clipped_samples_are_counted() {
-    let (desk, codes) = (desk(), codes());
-    let clipped: Vec<i64> = codes.iter().map(|code| (2 * code).clamp(-2048, 2047)).collect();
-    let count = clipped.iter().filter(|code| [-2048, 2047].contains(code)).count();
-    desk.write("codes.raw", bytes(&clipped, |x| (x as i16).to_le_bytes()));
-    let (_, warnings) = fused(&desk, &["codes.raw", "--format", "s16le", "--full-scale", "12bits"]);
-    assert!(warnings.len() == 1 && warnings[0].contains(&format!("{count} of 2000 samples")), "{warnings:?}");
-    let full = bytes(&codes, |x| (x as i16).to_le_bytes());
-    desk.write("codes.raw", full);
-    assert!(fused(&desk, &["codes.raw", "--format", "s16le", "--full-scale", "12bits"]).1.is_empty());
-}
-
 #[test]
 fn pairs_of_channels_are_complex_samples() {
     let desk = desk();

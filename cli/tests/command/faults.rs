@@ -1,15 +1,9 @@
-//! Systems that refuse: standard streams that cannot be written, threads that cannot be started, inputs
-//! without end.
+//! Systems that refuse: standard streams and files that cannot be written, memory that is not there.
 
 use crate::support::blocked::until_a_write_waits;
 use crate::support::{Desk, TERM, bytes, frames, fused, names, text};
-use std::io::Write;
-use std::os::fd::AsRawFd;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
-
-/// More than any address space: no thread with such a stack can be started.
-const IMPOSSIBLE_STACK: &str = "1000000000000000";
 
 /// hybank in a shell, which redirects its streams; `$H` stands for the binary.
 fn shell(desk: &Desk, script: &str) -> Output {
@@ -83,29 +77,6 @@ fn streams_that_fail_before_their_first_sample_leave_nothing() {
     }
 }
 
-#[test]
-fn without_threads_the_work_is_done_or_refused_in_one_line() {
-    let desk = Desk::new();
-    desk.write("spec.toml", crate::support::THESIS);
-    let input = bytes(&frames(50));
-    desk.write("in", &input);
-    let run = |args: &str| shell(&desk, &format!("RUST_MIN_STACK={IMPOSSIBLE_STACK} $H {args}"));
-    for args in ["design spec.toml -o thesis.json", "verify thesis.json"] {
-        let output = run(args);
-        assert!(output.status.success() && output.stderr.is_empty(), "{args}: {output:?}");
-    }
-    for (args, part) in [
-        ("stream bank.json --input in", "in: cannot start a thread that reads it"),
-        ("stream bank.json <in", "cannot start a thread that reads it"),
-        ("stream bank.json --threads 2 <in", "cannot start a thread that reads it"),
-    ] {
-        let output = run(args);
-        let message = text(&output.stderr);
-        assert_eq!((output.status.code(), message.lines().count()), (Some(1), 1), "{args}: {message}");
-        assert!(message.contains(part), "{args}: {message}");
-    }
-}
-
 /// The first signal asks for an end in order, which a blocked write holds up; a further one ends the
 /// process.
 fn end_by_signals(child: &mut Child) {
@@ -137,64 +108,6 @@ fn a_second_signal_ends_a_run_whose_output_nobody_takes() {
     until_a_write_waits(child.id(), None);
     end_by_signals(&mut child);
     assert_eq!(names(&desk.path("")), before, "an unfinished file is left");
-}
-
-#[test]
-fn inputs_without_end_are_refused_with_their_bound() {
-    let desk = Desk::with_model();
-    desk.write("in", bytes(&[1.0; 20]));
-    let bound = "longer than 67108864 bytes, the most that a spec or bank file may have";
-    desk.refused(1, &["verify", "/dev/zero"], &["/dev/zero", bound]);
-    let stream = ["stream", "bank.json", "--input", "in", "--input", "in", "-o", "out", "--gaps", "--lost"];
-    desk.refused(1, &[&stream[..], &["/dev/zero"]].concat(), &["/dev/zero", "longer than", "lost samples"]);
-    desk.write("lost", "{\"channel\":1,\"sample_start\":0,\"global_index\":0}\n{\"channel\":1,\"sample_start\":1,\"global_index\":4000000000}");
-    let refused = [&stream[..], &["lost"]].concat();
-    desk.refused(1, &refused, &["in: ", "more than 67108864", "allow 3999999999 to be lost"]);
-    desk.write("zero.sigmf-meta", r#"{"global": {"core:datatype": "ri8", "core:dataset": "/dev/zero"}}"#);
-    let args = ["stream", "bank.json", "--input", "zero.sigmf-meta", "-o", "out"];
-    desk.refused(1, &args, &["zero.sigmf-meta", "core:dataset", "same folder"]);
-    // A link beside the metadata leads as far.
-    std::os::unix::fs::symlink("/dev/zero", desk.path("link")).unwrap();
-    desk.write("zero.sigmf-meta", r#"{"global": {"core:datatype": "ri8", "core:dataset": "link"}}"#);
-    desk.refused(1, &args, &["zero.sigmf-meta", "core:dataset leads to \"link\"", "no file"]);
-    // A pipe without a writer does not even open.
-    std::fs::remove_file(desk.path("link")).unwrap();
-    assert!(Command::new("mkfifo").arg(desk.path("link")).status().unwrap().success());
-    desk.refused(1, &args, &["zero.sigmf-meta", "core:dataset leads to \"link\"", "no file"]);
-}
-
-/// A pipe that nobody reads, full to the last byte.
-fn full_pipe() -> (std::io::PipeReader, std::io::PipeWriter) {
-    let (reader, writer) = std::io::pipe().unwrap();
-    let mut filler = writer.try_clone().unwrap();
-    // The write that finds no room waits until the reader goes, at the end of the test.
-    let descriptor = filler.as_raw_fd();
-    std::thread::spawn(move || while filler.write_all(&[b'.'; 4096]).is_ok() {});
-    until_a_write_waits(std::process::id(), Some(descriptor));
-    (reader, writer)
-}
-
-#[test]
-fn a_second_signal_ends_a_run_whose_messages_nobody_takes() {
-    let desk = Desk::new();
-    desk.write("in", [bytes(&frames(50)), vec![1, 2, 3]].concat());
-    let (reader, writer) = full_pipe();
-    let mut child = Command::new(env!("CARGO_BIN_EXE_hybank"))
-        .current_dir(desk.path(""))
-        .args(["stream", "bank.json", "--input", "in", "-o", "out"])
-        .stderr(writer)
-        .spawn()
-        .unwrap();
-    // The warning about the cut frame comes after the output.
-    while !desk.path("out").exists() {
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    until_a_write_waits(child.id(), None);
-    assert!(child.try_wait().unwrap().is_none(), "the message was taken");
-    end_by_signals(&mut child);
-    assert!(desk.read("out") == bytes(&fused(&frames(50))));
-    assert_eq!(names(&desk.path("")), ["bank.json", "in", "out"]);
-    drop(reader);
 }
 
 /// A recording of zeros, of 400 MB on paper and none on the disk.

@@ -96,19 +96,6 @@ fn pipes_carry_headers_without_lengths() {
     assert_eq!(wav::samples(&desk, "again.wav"), wav::samples(&desk, "file.wav"));
 }
 
-#[test]
-fn a_closed_pipe_ends_quietly() {
-    let desk = Desk::new();
-    let (a, b) = ramps(1_000_000);
-    wav::write_pair(&desk, &a, &b);
-    let mut command = desk.command(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "-"]);
-    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    drop(child.stdout.take());
-    let output = child.wait_with_output().unwrap();
-    assert!(output.status.success(), "{output:?}");
-    assert!(output.stderr.is_empty(), "{output:?}");
-}
-
 #[cfg(unix)]
 #[test]
 fn an_interrupt_leaves_nothing_behind() {
@@ -131,18 +118,6 @@ fn an_interrupt_leaves_nothing_behind() {
     let message = text(&output.stderr);
     assert_eq!((output.status.code(), message.as_str()), (Some(128 + 2), ""));
     assert_eq!(names(&desk.path("")), before);
-}
-
-/// Real captures beside the checkout, if they are there: see the data's own description.
-#[test]
-fn speech_of_two_converters_opens() {
-    let Some(folder) = trials::data("captures/speech-2x") else { return };
-    let desk = Desk::new();
-    scale_bank(&desk, 1.0 / 48_000.0, 1.0 / 64.0);
-    let file = |name: &str| folder.join(name).display().to_string();
-    quietly(&desk, &["fuse", "bank.json", &file("ch1.wav"), &file("ch2.wav"), "-o", "out.wav"]);
-    let slow = wav::read(&folder.join("ch1.wav")).1.len();
-    assert_eq!(wav::samples(&desk, "out.wav").len(), 2 * slow);
 }
 
 #[test]

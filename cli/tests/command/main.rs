@@ -13,7 +13,6 @@ mod band;
 mod bit_true;
 mod calibrate;
 mod converter_errors;
-mod cuts;
 mod design;
 mod docs;
 mod doors;

@@ -85,17 +85,6 @@ fn the_samples_of_a_sigmf_recording_are_an_input_too() {
     assert_eq!(desk.read("samples.bin"), bytes(&frames(10)));
 }
 
-#[test]
-fn output_and_mask_are_two_files() {
-    let desk = desk();
-    let fuse = |output, mask| {
-        ["fuse", "bank.json", "a.wav", "b.wav", "--gaps", "--force", "-o", output, "--mask", mask]
-    };
-    desk.refused(1, &fuse("out.wav", "./out.wav"), &["same file"]);
-    desk.refused(1, &fuse("out.sigmf-meta", "out.sigmf-data"), &["same file"]);
-    desk.refused(2, &fuse("out.wav", "-"), &["--mask -", "standard output"]);
-}
-
 /// What a live run could not give its names is whole, and named by the message; removes it.
 fn remain(desk: &Desk, message: &str, count: usize) {
     let (_, files) = message.trim_end().split_once("; what was recorded is in ").expect(message);

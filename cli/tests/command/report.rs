@@ -1,6 +1,6 @@
 //! The page about a bank, and the manual pages.
 
-use crate::support::{Desk, THESIS, text, wav};
+use crate::support::{Desk, THESIS};
 
 /// Tags that load something, or could.
 const LOADING: [&str; 6] = ["<script", "<img", "<iframe", "src=", "@import", "url("];
@@ -69,22 +69,6 @@ fn captures_are_shown_before_and_after() {
     }
     desk.refused(1, &["report", "b.json", "cap/ch1.wav", "-o", "other.html"], &["2 channels", "1"]);
     assert!(!desk.path("other.html").exists());
-}
-
-/// The first 2^20 frames are on the page, which the warning and the caption say.
-#[test]
-fn long_captures_are_cut_with_a_warning() {
-    let desk = Desk::new();
-    desk.write("spec.toml", THESIS.replace("taps = 22", "taps = 4"));
-    desk.good(&["design", "spec.toml", "-o", "b.json"]);
-    let frames = (1 << 20) + 5;
-    wav::write(&desk, "long.wav", 2, 24_000, &vec![0.25; 2 * frames]);
-    let output = desk.run(&["report", "b.json", "long.wav", "-o", "r.html"], &[]);
-    let message = text(&output.stderr);
-    assert!(output.status.success(), "{message}");
-    assert!(message.contains("long.wav: only the first 1048576 frames are on the page"), "{message}");
-    let page = String::from_utf8(desk.read("r.html")).unwrap();
-    assert!(page.contains("the first 1048576 frames of the captures"));
 }
 
 #[test]

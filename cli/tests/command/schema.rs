@@ -3,7 +3,6 @@
 use crate::support::{Desk, THESIS, schema};
 use serde_json::{Value, json};
 use std::path::Path;
-use std::process::Command;
 
 fn schema_of(desk: &Desk, kind: &str) -> Value {
     serde_json::from_str(&desk.good(&["schema", kind])).unwrap()
@@ -93,35 +92,4 @@ fn reports_fit_their_schema() {
         assert_eq!(schema::faults(&schema, &report), Vec::<String>::new(), "{flags:?}");
         assert!(!schema::faults(&schema, &damaged(&report, "/gamma", json!(1.0))).is_empty());
     }
-}
-
-/// The same with the validator of another language, where it is installed.
-#[test]
-fn pythons_validator_agrees() {
-    let probe = Command::new("python3").args(["-c", "import jsonschema, tomllib"]).output();
-    if !probe.is_ok_and(|output| output.status.success()) {
-        trials::skipped(&"the schema by another validator: no python3 with jsonschema");
-        return;
-    }
-    let desk = Desk::with_spec(THESIS);
-    desk.good(&["design", "spec.toml", "-o", "b.json"]);
-    let report = desk.json(&["design", "spec.toml", "-o", "b.json", "--force", "--json"]);
-    desk.write("report.json", report.to_string());
-    for kind in ["spec", "bank", "report"] {
-        desk.write(&format!("{kind}.schema.json"), desk.good(&["schema", kind]));
-    }
-    let script = "\
-import json, jsonschema, tomllib
-validator = lambda kind: jsonschema.Draft202012Validator(json.load(open(kind + '.schema.json')))
-spec = tomllib.load(open('spec.toml', 'rb'))
-bank, report = json.load(open('b.json')), json.load(open('report.json'))
-for kind, document, damage in [('spec', spec, ('ratio', 0)), ('bank', bank, ('version', 2)), ('report', report, ('gamma', 1))]:
-    check = validator(kind)
-    check.check_schema(check.schema)
-    check.validate(document)
-    assert not check.is_valid(document | dict([damage])), kind
-";
-    desk.write("check.py", script);
-    let output = Command::new("python3").arg("check.py").current_dir(desk.path("")).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }

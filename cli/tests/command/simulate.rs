@@ -56,21 +56,6 @@ fn every_source_is_captured_and_fused() {
 }
 
 #[test]
-fn a_simulated_step_is_the_closed_form() {
-    let desk = Desk::with_spec(THESIS);
-    desk.good(&["simulate", "spec.toml", "--source", "step@0.3", "-o", "cap", "--gain", "0.5"]);
-    // Step response of 0.25 / (s + 0.5)^2.
-    let step = |t: f64| if t < 0.0 { 0.0 } else { 1.0 - (1.0 + 0.5 * t) * (-0.5 * t).exp() };
-    for (name, delay, period) in [("ch1", 1.2, 2.0), ("ch2", 0.6, 2.0), ("target", 0.0, 1.0)] {
-        let (_, samples) = recording(&desk.path(&format!("cap/{name}.wav")));
-        for (k, x) in samples.iter().enumerate() {
-            let expected = 0.5 * step(k as f64 * period - delay - 0.3);
-            assert!((x - expected).abs() < 1e-7, "{name}[{k}]: {x} instead of {expected}");
-        }
-    }
-}
-
-#[test]
 fn a_recording_is_a_source() {
     let desk = Desk::with_spec(THESIS);
     // A whole number of periods, so that the periodic continuation is the tone itself.
@@ -89,112 +74,6 @@ fn a_recording_is_a_source() {
     desk.refused(1, &["simulate", "spec.toml", "--source", "none.wav", "-o", "c2"], &["none.wav"]);
 }
 
-/// [`THESIS`] with the gains and offsets of two converters.
-fn imperfect(gains: [f64; 2], offsets: [f64; 2]) -> String {
-    let channel = |delay: &str, i: usize| {
-        format!("delay = {delay}\ngain = {:?}\noffset = {:?}\n", gains[i], offsets[i])
-    };
-    THESIS.replace("delay = 1.2\n", &channel("1.2", 0)).replace("delay = 0.6\n", &channel("0.6", 1))
-}
-
-#[test]
-fn gains_and_offsets_of_converters_are_undone() {
-    let desk = Desk::with_spec(THESIS);
-    desk.write("real.toml", imperfect([1.01, -0.97], [0.02, -0.011]));
-    desk.good(&["design", "spec.toml", "-o", "ideal.json"]);
-    desk.good(&["design", "real.toml", "-o", "real.json"]);
-    desk.good(&["verify", "real.json"]);
-    let simulate = |spec: &str, folder: &str| {
-        desk.good(&["simulate", spec, "--source", "tones:0.3,0.8", "-o", folder, "--samples", "4000"]);
-    };
-    simulate("spec.toml", "ideal");
-    simulate("real.json", "real");
-    let capture = |folder: &str, name: &str| recording(&desk.path(folder).join(name)).1;
-    for (name, gain, offset) in
-        [("ch1.wav", 1.01, 0.02), ("ch2.wav", -0.97, -0.011), ("target.wav", 1.0, 0.0)]
-    {
-        for (real, ideal) in capture("real", name).iter().zip(capture("ideal", name)) {
-            assert!((real - (gain * ideal + offset)).abs() < 1e-6, "{name}: {real} {ideal}");
-        }
-    }
-    let snr = |bank: &str, folder: &str| {
-        let [first, second] = ["ch1.wav", "ch2.wav"].map(|name| format!("{folder}/{name}"));
-        let output = desk.run(&["fuse", bank, &first, &second, "-o", "y.wav", "--force"], &[]);
-        // A bank for ideal converters notices that one of them is inverted.
-        let is_unaware = bank == "ideal.json" && folder == "real";
-        assert!(output.status.success(), "{output:?}");
-        assert_eq!(String::from_utf8_lossy(&output.stderr).contains("inverted"), is_unaware, "{output:?}");
-        snr_db(&capture("", "y.wav"), &capture(folder, "target.wav"), 60)
-    };
-    let [ideal, real, unaware] = [("ideal.json", "ideal"), ("real.json", "real"), ("ideal.json", "real")]
-        .map(|(bank, folder)| snr(bank, folder));
-    assert!((ideal - real).abs() < 0.1 && ideal > 45.0, "{ideal:.2} dB, {real:.2} dB");
-    assert!(unaware < 10.0, "{unaware:.2} dB");
-}
-
-/// Converters without a signal deliver their offsets. The output is silence from the first sample to the
-/// last one of the flush, and where samples are missing.
-#[test]
-fn converters_without_a_signal_give_silence() {
-    let desk = Desk::with_spec(&imperfect([1.0, 1.0], [0.01, -0.3]));
-    desk.good(&["design", "spec.toml", "-o", "bank.json"]);
-    desk.good(&["simulate", "bank.json", "--source", "tones:1", "-o", "cap", "--gain", "0"]);
-    let (rate, mut first) = recording(&desk.path("cap/ch1.wav"));
-    assert!(first.iter().all(|&x| (x - 0.01).abs() < 1e-9), "{first:?}");
-    first[40] = f64::NAN;
-    first[0] = f64::NAN;
-    let lossy: Vec<f32> = first.iter().map(|&x| x as f32).collect();
-    wav::write(&desk, "lossy.wav", 1, rate, &lossy);
-    for more in [&[][..], &["--keep-latency"], &["--gaps"], &["--algorithm", "overlap-save"]] {
-        let args =
-            [&["fuse", "bank.json", "lossy.wav", "cap/ch2.wav", "-o", "y.wav", "--force"], more].concat();
-        // The missing samples are reported.
-        assert!(desk.run(&args, &[]).status.success());
-        let fused = recording(&desk.path("y.wav")).1;
-        assert!(fused.len() == 200 && fused.iter().all(|&y| y.abs() < 1e-7), "{more:?}: {fused:?}");
-    }
-    desk.good(&[
-        "stream",
-        "bank.json",
-        "--input",
-        "cap/ch1.wav",
-        "--input",
-        "cap/ch2.wav",
-        "--format",
-        "wav",
-        "--flush",
-        "-o",
-        "live.wav",
-    ]);
-    assert!(recording(&desk.path("live.wav")).1.iter().all(|&y| y == 0.0));
-}
-
-#[test]
-fn one_channel_of_a_recording_is_a_source() {
-    let desk = Desk::with_spec(THESIS);
-    let samples = |scale: f32| (0..400).map(move |n| scale * (n as f32 * 0.1).sin());
-    let wide: Vec<f32> =
-        samples(0.1).zip(samples(0.5)).zip(samples(0.9)).flat_map(|((a, b), c)| [a, b, c]).collect();
-    wav::write(&desk, "wide.wav", 3, 8_000, &wide);
-    wav::write(&desk, "second.wav", 1, 8_000, &samples(0.5).collect::<Vec<_>>());
-    let simulate = |more: &[&str]| desk.good(&[&["simulate", "spec.toml"], more].concat());
-    simulate(&["--source", "wide.wav", "--channel", "2", "-o", "a"]);
-    simulate(&["--source", "second.wav", "-o", "b"]);
-    simulate(&["--source", "second.wav", "--channel", "1", "-o", "c"]);
-    for folder in ["b", "c"] {
-        assert!(desk.read("a/ch1.wav") == desk.read(&format!("{folder}/ch1.wav")), "{folder}");
-    }
-    for (code, more, parts) in [
-        (1, &["--source", "wide.wav"][..], &["wide.wav has 3 channels", "--channel 1 to 3"][..]),
-        (1, &["--source", "wide.wav", "--channel", "4"], &["channel 4", "has 3 channels, counted from 1"]),
-        (2, &["--source", "wide.wav", "--channel", "0"], &["--channel"]),
-        (2, &["--source", "step@1", "--channel", "1"], &["--channel 1", "no WAV recording"]),
-    ] {
-        desk.refused(code, &[&["simulate", "spec.toml", "-o", "d"], more].concat(), parts);
-    }
-}
-
-/// Two captures of a speech recording with the wanted signal, made elsewhere in the frequency domain.
 /// Complex numbers of little-endian 32-bit floats.
 fn complex(bytes: &[u8]) -> Vec<[f64; 2]> {
     let number = |bytes: &[u8]| f64::from(f32::from_le_bytes(bytes.try_into().unwrap()));

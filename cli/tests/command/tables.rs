@@ -1,6 +1,6 @@
 //! Captures as tables that instruments and loggers wrote. As a user runs it.
 
-use crate::support::{Desk, channel, frames, fused, interleaved, text, wav};
+use crate::support::{Desk, channel, frames, fused, interleaved, wav};
 
 /// The two channels of a capture.
 fn channels(count: usize) -> (Vec<f32>, Vec<f32>) {
@@ -39,41 +39,6 @@ fn files_of_an_oscilloscope_are_fused() {
     let named =
         ["fuse", "bank.json", "german.csv", "--columns", "A,B", "--time-column", "none", "-o", "named.wav"];
     desk.good(&named);
-}
-
-#[test]
-fn bare_decimal_commas_are_refused_with_the_option() {
-    let desk = Desk::new();
-    let (a, b) = channels(300);
-    let bare = |samples: &[f32]| table("", samples, |_, x| format!("{x:.6}").replace('.', ","));
-    desk.write("a.csv", bare(&a));
-    desk.write("b.csv", bare(&b));
-    let fuse = ["fuse", "bank.json", "-o", "out.wav", "--keep-latency"];
-    desk.refused(1, &[&fuse[..], &["a.csv"]].concat(), &["a.csv", "decimal comma", "--decimal comma"]);
-    desk.good(&[&fuse[..], &["a.csv", "b.csv", "--decimal", "comma"]].concat());
-    assert!(wav::samples(&desk, "out.wav") == fused(&interleaved(&a, &b)));
-}
-
-#[test]
-fn a_first_column_that_is_a_ramp_is_said_or_refused() {
-    let desk = Desk::new();
-    let (a, b) = channels(300);
-    desk.write("three.csv", table("", &a, |k, x| format!("{k},{x},{}", b[k])));
-    desk.write("two.csv", table("", &a, |k, x| format!("{:.10},{x}", k as f64 / 1024.0)));
-    let fuse = ["fuse", "bank.json", "-o", "out.wav", "--keep-latency", "--force"];
-    let said = desk.run(&[&fuse[..], &["three.csv"]].concat(), &[]);
-    assert!(said.status.success() && text(&said.stderr).contains("steady ramp"), "{said:?}");
-    assert!(wav::samples(&desk, "out.wav") == fused(&interleaved(&a, &b)));
-    desk.refused(
-        1,
-        &[&fuse[..], &["two.csv"]].concat(),
-        &["two.csv: 1", "steady ramp", "--time-column none"],
-    );
-    desk.good(&[&fuse[..], &["two.csv", "--time-column", "none"]].concat());
-    let ramp: Vec<f32> = (0..300).map(|k| k as f32 / 1024.0).collect();
-    assert!(wav::samples(&desk, "out.wav") == fused(&interleaved(&ramp, &a)));
-    let strict = [&fuse[..], &["three.csv", "--strict"]].concat();
-    desk.refused(1, &strict, &["steady ramp"]);
 }
 
 #[test]

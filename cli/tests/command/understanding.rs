@@ -1,7 +1,6 @@
-//! What the user meant: units, implausible specs, the scale of gamma, files of the wrong kind, specs to
-//! begin with.
+//! What the user meant: units, implausible specs, the scale of gamma, specs to begin with.
 
-use crate::support::{Desk, THESIS, number, text};
+use crate::support::{Desk, number, text};
 
 /// Two audio converters; the words in braces are replaced.
 const AUDIO: &str = "\
@@ -51,14 +50,6 @@ fn slips_are_warned_of_and_refused_with_strict() {
 }
 
 #[test]
-fn a_bank_that_reaches_nothing_is_named() {
-    let desk = Desk::with_spec(THESIS);
-    let flags = ["--method", "sinc", "--taps", "2", "--latency", "10"];
-    let (code, message) = designed(&desk, THESIS, &flags);
-    assert!(code == Some(0) && message.contains("% of that of zero output"), "{message}");
-}
-
-#[test]
 fn gamma_has_a_scale_and_the_spec_is_echoed() {
     let desk = Desk::with_spec(AUDIO);
     let report = desk.json(&["design", "spec.toml", "-o", "b.json", "--json"]);
@@ -70,50 +61,6 @@ fn gamma_has_a_scale_and_the_spec_is_echoed() {
     let (zero, plain) = (number(&report, "/scale/zero_output"), number(&report, "/scale/interleaving"));
     assert!(number(&report, "/gamma/norm") < 0.1 * plain && plain < zero, "{report}");
     assert!((zero - 1.0).abs() < 1e-3, "the target has unit gain: {report}");
-}
-
-#[test]
-fn files_of_the_wrong_kind_are_named_for_what_they_are() {
-    let desk = Desk::with_spec(AUDIO);
-    desk.good(&["design", "spec.toml", "-o", "b.json"]);
-    desk.refused(1, &["design", "b.json", "-o", "c.json"], &["b.json", "this is a bank", "a spec is needed"]);
-    for command in [&["analyze", "spec.toml"][..], &["verify", "spec.toml"]] {
-        desk.refused(1, command, &["spec.toml", "this is a spec", "hybank design spec.toml"]);
-    }
-    desk.write("a.wav", b"RIFF\x24\0\0\0WAVEfmt ");
-    desk.write("x.wav", b"\x93NUMPY\x01\0v\0{}");
-    desk.write("page.html", "<!DOCTYPE html>\nratio");
-    for (args, found) in [
-        (&["design", "a.wav", "-o", "c.json"][..], "a.wav: this is a WAV recording, and a spec is needed"),
-        (&["verify", "a.wav"], "a.wav: this is a WAV recording, and a bank is needed"),
-        (&["analyze", "page.html"], "page.html: this is a page"),
-        (&["fuse", "b.json", "b.json", "-o", "y.wav"], "b.json: this is a bank, and a recording is needed"),
-        (&["calibrate", "spec.toml", "spec.toml", "spec.toml", "-o", "m.toml"], "spec.toml: this is a spec"),
-        (&["measure", "x.wav"], "x.wav: this is a NumPy array"),
-    ] {
-        desk.refused(1, args, &[found]);
-    }
-}
-
-/// A name that promises another format is refused before anything is read.
-#[test]
-fn names_of_outputs_say_what_is_in_them() {
-    let desk = Desk::with_spec(AUDIO);
-    for (name, part) in [
-        ("out.flac", "sox -t wav - out.flac"),
-        ("out.MP3", "not mp3"),
-        ("out.npz", "name it out.wav"),
-        ("out.raw", "hybank stream"),
-        ("out.sigmf", "name it out.sigmf-meta"),
-        ("out.sigmf-data", "name it out.sigmf-meta"),
-    ] {
-        desk.refused(2, &["fuse", "b.json", "a.wav", "-o", name], &[name, part]);
-    }
-    for (name, part) in [("out.npy", "name it out.raw"), ("out.ogg", "sox")] {
-        desk.refused(2, &["stream", "b.json", "-o", name], &[name, part]);
-    }
-    let wav = ["stream", "b.json", "--format", "wav", "-o", "out.raw"];
-    desk.refused(2, &wav, &["out.raw: the output is WAV, not raw"]);
 }
 
 #[test]
@@ -170,20 +117,6 @@ fn a_bank_is_drawn_in_nine_pictures() {
     desk.refused(1, &["plot", "b.json", "-o", "pictures"], &["exists", "--force"]);
     let spectrum = ["measure", "x.wav", "--plot", "spectrum.png"];
     desk.refused(2, &spectrum, &["spectrum.png", "written as SVG", "name it spectrum.svg"]);
-}
-
-/// Longer filters and later outputs are drawn, and the level of the bank goes through its own point.
-#[test]
-fn gamma_is_drawn_against_latency_and_taps() {
-    let desk = Desk::with_spec(THESIS);
-    desk.good(&["design", "spec.toml", "-o", "b.json"]);
-    let files = desk.good(&["plot", "b.json", "-o", "pictures", "--sweeps"]);
-    assert_eq!(files.lines().count(), 11);
-    for (name, x) in [("latency", "latency, fast samples"), ("taps", "taps per channel")] {
-        let picture = String::from_utf8(desk.read(&format!("pictures/{name}.svg"))).unwrap();
-        assert!([x, "this bank", "gamma, dB"].iter().all(|word| picture.contains(word)), "{name}");
-        assert!(!picture.contains("NaN"), "{name}");
-    }
 }
 
 /// A response table of a Butterworth filter of order 4, by its definition.

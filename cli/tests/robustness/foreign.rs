@@ -3,7 +3,6 @@
 
 use crate::support::{Desk, THESIS};
 use hybank::messages::printable;
-use std::path::Path;
 
 /// Clears the screen, turns text around, and begins a line that looks like one of the program.
 const HOSTILE: &str = "\u{1b}[2J\u{9b}31m\u{202e}\u{7}\r\nhybank: forged";
@@ -161,20 +160,6 @@ fn foreign_text_in_files_is_quoted_and_bounded() {
     println!("{trials} inputs with foreign text");
 }
 
-#[test]
-fn foreign_variables_of_a_matlab_file_are_quoted() {
-    let desk = desk();
-    let seed = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("fuzz/seeds/mat/several.mat");
-    let mut bytes = std::fs::read(seed).unwrap();
-    let place = bytes.windows(5).position(|window| window == b"right").unwrap();
-    bytes[place..place + 5].copy_from_slice(b"\x1b[2J\n");
-    desk.write("several.mat", bytes);
-    for file in ["several.mat", "several.mat:\u{1b}[2J"] {
-        let said = said(&desk, &["fuse", "bank.json", file, "-o", "out.wav"]);
-        assert!(check(&said, file) && said.contains("\\u{1b}[2J"), "{said}");
-    }
-}
-
 /// Every name that a run may have, and every option that takes a value.
 #[test]
 fn foreign_names_and_arguments_are_quoted_and_bounded() {
@@ -215,26 +200,4 @@ fn foreign_names_and_arguments_are_quoted_and_bounded() {
             check(&said(&desk, args), &format!("{:?}", &args[..args.len().min(3)]));
         }
     }
-}
-
-/// A file that has such a name is read and written, and named in what is printed.
-#[test]
-#[cfg(unix)]
-fn files_of_hostile_names_work() {
-    let desk = desk();
-    let name = HOSTILE;
-    desk.write(&format!("{name}.toml"), THESIS);
-    let spec = format!("{name}.toml");
-    for args in [
-        &["design", &spec, "-o", name][..],
-        &["design", &spec, "-o", name],
-        &["design", &spec, "-o", name, "--force", "--strict"],
-        &["analyze", name],
-        &["verify", name],
-        &["simulate", name, "--source", "step@3", "-o", &format!("{name}-folder")],
-        &["fuse", "bank.json", name, name, "-o", "out.wav"],
-    ] {
-        assert!(check(&said(&desk, args), &format!("{args:?}")), "{args:?}");
-    }
-    assert!(desk.path(name).is_file());
 }

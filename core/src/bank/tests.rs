@@ -337,7 +337,7 @@ fn what_json_cannot_say_is_not_written() {
     for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let tap = Bank { filters: SynthesisFilters::Fir(vec![vec![0.0; 3], vec![0.0, value, 0.0]]), ..fir() };
         let error = tap.to_json().unwrap_err();
-        assert_eq!((error.path(), error.file()), ("channels[1].taps[1]", ""));
+        assert_eq!(error.path(), "channels[1].taps[1]");
         let gamma = Bank { gamma: Gamma { lower: Some(value), ..Gamma::default() }, ..fir() };
         assert_eq!(gamma.to_json().unwrap_err().path(), "gamma.lower");
         let delay = Bank { delays: vec![Seconds(value), Seconds(0.6)], ..fir() };

@@ -184,11 +184,6 @@ impl Refusal {
         self.inner.overridden.then_some(self.inner.path.as_str())
     }
 
-    /// The file name as it was given; empty for what is in memory.
-    pub fn file(&self) -> &str {
-        &self.inner.file
-    }
-
     /// The path of keys to the value, such as `channel[1].filter.den`; empty for the whole document.
     pub fn path(&self) -> &str {
         &self.inner.path

@@ -59,11 +59,6 @@ impl Band {
     pub fn is_low_pass(self) -> bool {
         self.low.0 == 0.0
     }
-
-    /// Whether the band holds `frequency`.
-    pub fn contains(self, frequency: Hertz) -> bool {
-        (self.low.0..=self.high.0).contains(&frequency.0)
-    }
 }
 
 impl SignalSpec {

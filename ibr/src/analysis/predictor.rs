@@ -16,7 +16,8 @@ pub struct Predictor<'a, P> {
     maps: Vec<(&'a DepthMap, P)>,
     study: Study,
     calibration: Calibration,
-    agreement: Agreement,
+    /// How well the views agree, as they were given.
+    pub agreement: Agreement,
 }
 
 impl<'a, P: Geometry> Predictor<'a, P> {
@@ -37,16 +38,6 @@ impl<'a, P: Geometry> Predictor<'a, P> {
         let calibration = Calibration::of(&views, &study)?;
         study.settings.offset = settings.offset;
         Ok(Self { images, maps, study, calibration, agreement })
-    }
-
-    /// How well the views agree, as they were given.
-    pub fn agreement(&self) -> &Agreement {
-        &self.agreement
-    }
-
-    /// The weights of the causes.
-    pub fn calibration(&self) -> &Calibration {
-        &self.calibration
     }
 
     /// The views, with one exposure.

@@ -50,7 +50,7 @@ impl Job<'_> {
         let mut summaries = Vec::new();
         for (camera, outputs) in cameras.iter().zip(&files) {
             let predicted = predictor.at(camera, size).map_err(named)?;
-            let mut summary = Summary::new(&predicted, predictor.agreement(), &scene.outliers);
+            let mut summary = Summary::new(&predicted, &predictor.agreement, &scene.outliers);
             summary.measure(&predicted, truth.as_ref(), arguments.scene.truth.as_deref())?;
             for (_, path) in &outputs.parts {
                 let estimate = Image::from_values(size, 1, predicted.estimate.clone());
@@ -58,8 +58,8 @@ impl Job<'_> {
             }
             summaries.push(summary);
         }
-        inputs::warn_of_contradictions(predictor.agreement(), &scene.kind);
-        print(summaries, predictor.agreement(), arguments.scene.json)
+        inputs::warn_of_contradictions(&predictor.agreement, &scene.kind);
+        print(summaries, &predictor.agreement, arguments.scene.json)
     }
 }
 

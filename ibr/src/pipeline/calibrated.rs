@@ -138,7 +138,7 @@ impl Plane<'_> {
         let (propagated, used) = (propagated.into_inner(), problem.samples());
         let dropped = self.footprint.dropped(propagated);
         if propagated == 0 {
-            return Err(RenderError::NoOverlap { pixels: self.footprint.pixels(), dropped });
+            return Err(RenderError::NoOverlap { pixels: self.footprint.pixels, dropped });
         }
         let report = Report { propagated, occluded: propagated - used, used, dropped, ..Report::default() };
         let fit = problem.stiffened_by_area().solve();

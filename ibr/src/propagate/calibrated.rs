@@ -27,7 +27,7 @@ pub(crate) struct Footprint {
     maps: Vec<Relative>,
     frame: Frame,
     tiles: Vec<Tile>,
-    pixels: usize,
+    pub(crate) pixels: usize,
     unknown: usize,
     behind: usize,
 }
@@ -66,11 +66,6 @@ impl Footprint {
     /// Samples in the frame, at most.
     pub(crate) fn most_samples(&self) -> usize {
         self.tiles.len() * TILE
-    }
-
-    /// The pixels of the chosen views.
-    pub(crate) fn pixels(&self) -> usize {
-        self.pixels
     }
 
     /// Pixels outside the frame or without depth, if this many are samples.

@@ -25,11 +25,6 @@ impl Normalisation {
         (p - self.centroid) * self.scale
     }
 
-    /// Pixels to normalised units: the factor by which lengths grow.
-    pub fn scale(&self) -> f64 {
-        self.scale
-    }
-
     /// T with T x~ the normalised point; its third row is (0, 0, 1), so that third coordinates, and with
     /// them depth and chi, are the same in both coordinates.
     pub fn matrix(&self) -> Matrix3<f64> {
@@ -64,6 +59,6 @@ mod tests {
     #[test]
     fn coinciding_points_do_not_divide_by_zero() {
         let points = [Point::new(3.0, 4.0); 5];
-        assert_eq!(Normalisation::of(points.iter()).scale(), 1.0);
+        assert_eq!(Normalisation::of(points.iter()).scale, 1.0);
     }
 }

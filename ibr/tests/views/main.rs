@@ -13,4 +13,3 @@ mod support;
 #[path = "../../examples/demo/synthetic.rs"]
 mod synthetic;
 mod thesis_page;
-mod two_planes;

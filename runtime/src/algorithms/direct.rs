@@ -97,7 +97,7 @@ impl<T: Sample> Direct<T> {
     /// those whose history is there, and as many as it takes for the others to fill vectors. `None` if all
     /// had better go there.
     fn head(&self, frames: usize) -> Option<usize> {
-        let vector = self.filters.tiling().vector;
+        let vector = self.filters.tiling.vector;
         let head = self.history_frames + (frames.wrapping_sub(self.history_frames) & (vector - 1));
         let pays = frames * self.channels >= SHORT_CALL && frames >= 2 * head;
         (pays && head <= self.block).then_some(head)
@@ -109,7 +109,7 @@ impl<T: Sample> Direct<T> {
     /// The head is filtered last in its block: its loads would straddle recent stores, and store forwarding
     /// would stall.
     fn process_in_memory(&self, history: &mut History<T>, samples: &[T], head: usize, out: &mut [T]) -> u64 {
-        let (n, &Tiling { history: before, vector, .. }) = (self.channels, self.filters.tiling());
+        let (n, &Tiling { history: before, vector, .. }) = (self.channels, &self.filters.tiling);
         let frames = samples.len() / n;
         let segment = |first: usize, end: usize| {
             let x = &samples[first * n - before..end * n];
@@ -211,7 +211,7 @@ impl<T: Sample> Direct<T> {
     /// Filters `touched` of the frames in the history's room, whose outputs are those of a range of frames.
     fn filter_again(&self, history: &History<T>, touched: Range<usize>, frames: Range<usize>, out: &mut [T]) {
         // Whole vectors take least time.
-        let len = touched.len().next_multiple_of(self.filters.tiling().vector);
+        let len = touched.len().next_multiple_of(self.filters.tiling.vector);
         let len = len.min(frames.len() - touched.start);
         let x = &history.view()[touched.start * self.channels..];
         self.filters.run(&[Segment { x, first: frames.start + touched.start, frames: len }], out);
@@ -246,7 +246,7 @@ impl<T: Sample> Filter for Direct<T> {
     }
 
     fn state(&self) -> DirectState<T> {
-        let (n, &Tiling { history, vector, .. }) = (self.channels, self.filters.tiling());
+        let (n, &Tiling { history, vector, .. }) = (self.channels, &self.filters.tiling);
         DirectState {
             history: History::new(n, history, self.block * n, vector * n),
             output: Aligned::new(self.ratio * self.block),

@@ -11,17 +11,29 @@ use crate::lti::{LtiError, StateSpace};
 use std::ops::{Range, RangeInclusive};
 use std::rc::Rc;
 
-/// A feedthrough below this fraction of its measurement is a rounding error: the channel adds no
-/// information.
-const INNOVATION_FLOOR: f64 = 1e-12;
-/// The result "impossible" is accepted up to this residual of the Riccati equation, in coordinates in which
-/// the mean-square covariance is the identity. The result is exact for a plant that differs by no more than
-/// that.
-const CONCLUSIVE_RESIDUAL: f64 = 1e-7;
-/// Least share of the largest error variance with which a direction is scaled.
-const BALANCING_FLOOR: f64 = 1e-13;
-/// Rounding does not move an eigenvalue of a semidefinite matrix this far (relative) below zero.
-const CLEARLY_NEGATIVE: f64 = 1e-5;
+/// What the Riccati solver in doubles takes for rounding.
+struct Settings {
+    /// A feedthrough below this fraction of its measurement is a rounding error: the channel adds no
+    /// information.
+    innovation_floor: f64,
+    /// The result "impossible" is accepted up to this residual of the Riccati equation, in coordinates in
+    /// which the mean-square covariance is the identity. The result is exact for a plant that differs by no
+    /// more than that.
+    conclusive_residual: f64,
+    /// Least share of the largest error variance with which a direction is scaled: below, the variance is
+    /// rounding.
+    balancing_floor: f64,
+    /// Rounding does not move an eigenvalue of a semidefinite matrix this far (relative) below zero.
+    clearly_negative: f64,
+}
+
+/// Of every equation.
+const SETTINGS: Settings = Settings {
+    innovation_floor: 1e-12,
+    conclusive_residual: 1e-7,
+    balancing_floor: 1e-13,
+    clearly_negative: 1e-5,
+};
 
 /// The plant with the measured inputs eliminated.
 ///
@@ -59,7 +71,7 @@ pub(in crate::design) struct Innovations {
     delayed: Vec<DelayedChannel>,
     channels: usize,
     /// Feedthrough of the channel with the least, given the channels before it, relative to its size.
-    least_feedthrough: f64,
+    pub(super) least_feedthrough: f64,
     /// The result "impossible" may be accepted: the coordinates are balanced and no channel is left out.
     conclusive: bool,
     /// The map to the plant's own coordinates, and the same there, where the columns of the delay chains
@@ -128,7 +140,7 @@ impl Innovations {
             .collect();
         let feedthroughs = relative_feedthroughs(plant, &direct, &sizes);
         let least = feedthroughs.iter().map(|&(_, share)| share).fold(1.0, f64::min);
-        let informative = feedthroughs.into_iter().filter(|&(_, share)| share > INNOVATION_FLOOR);
+        let informative = feedthroughs.into_iter().filter(|&(_, share)| share > SETTINGS.innovation_floor);
         Ok(Self::separate(plant, informative.map(|(channel, _)| channel).collect(), delayed, least))
     }
 
@@ -179,12 +191,7 @@ impl Innovations {
 
     /// Whether the feedthrough of a channel is rounding, so that the channel was left out.
     fn leaves_out_a_channel(&self) -> bool {
-        self.least_feedthrough <= INNOVATION_FLOOR
-    }
-
-    /// Feedthrough of the channel with the least, relative to its size.
-    pub(super) fn least_feedthrough(&self) -> f64 {
-        self.least_feedthrough
+        self.least_feedthrough <= SETTINGS.innovation_floor
     }
 
     /// F P0 F' - P0: what the substitution adds to Q.
@@ -200,7 +207,7 @@ impl Innovations {
     pub(super) fn balanced(&self) -> Option<Self> {
         let p = self.mean_square_covariance()?;
         let (values, vectors) = linalg::symmetric_eigen(&p).ok()?;
-        let floor = BALANCING_FLOOR * values.iter().fold(0.0_f64, |m, v| m.max(*v));
+        let floor = SETTINGS.balancing_floor * values.iter().fold(0.0_f64, |m, v| m.max(*v));
         if floor <= 0.0 || !floor.is_finite() {
             return None;
         }
@@ -305,8 +312,8 @@ impl Innovations {
         let p = &solution.x + &self.p0;
         let Ok(eigenvalues) = linalg::hermitian_eigenvalues(&p) else { return Trial::Unresolved };
         let largest = eigenvalues.iter().fold(0.0_f64, |m, e| m.max(e.abs()));
-        if eigenvalues.first().is_some_and(|&least| least < -CLEARLY_NEGATIVE * largest) {
-            let is_shown = solution.residual < CONCLUSIVE_RESIDUAL && self.conclusive;
+        if eigenvalues.first().is_some_and(|&least| least < -SETTINGS.clearly_negative * largest) {
+            let is_shown = solution.residual < SETTINGS.conclusive_residual && self.conclusive;
             return if is_shown { Trial::Impossible } else { Trial::Unresolved };
         }
         self.filter(&p).map_or(Trial::Unresolved, Trial::Achieved)
@@ -395,7 +402,7 @@ fn relative_feedthroughs(plant: &LiftedPlant, direct: &[usize], sizes: &[f64]) -
         let l = linalg::lq_factor(&plant.system().d().select_rows(&kept));
         let row = kept.len() - 1;
         let innovation = if row < l.ncols() { l[(row, row)].abs() } else { 0.0 };
-        if innovation <= INNOVATION_FLOOR * sizes[channel] {
+        if innovation <= SETTINGS.innovation_floor * sizes[channel] {
             kept.pop();
         }
         (channel, innovation / sizes[channel])

@@ -9,7 +9,7 @@
 use super::{GAMMA_ACCURACY, MethodSettings, Synthesis, tap_lags};
 use crate::design::DesignError;
 use crate::design::error_grid::{ErrorGrid, GridFrequency};
-use crate::design::exchange::{Exchange, LEAST_MARGIN};
+use crate::design::exchange::{self, Exchange};
 use crate::design::plant::LiftedPlant;
 use crate::lmi::sampled::{MeanSquareObjective, SampledProblem};
 use crate::lti::peak::Peak;
@@ -62,7 +62,7 @@ fn exchange<'a>(
 
 /// 1e-3 if a channel has noise, else the least possible margin.
 fn usual_margin(noise: &[f64]) -> f64 {
-    if noise.iter().any(|power| *power > 0.0) { NOISY_MARGIN } else { LEAST_MARGIN }
+    if noise.iter().any(|power| *power > 0.0) { NOISY_MARGIN } else { exchange::SETTINGS.least_margin }
 }
 
 /// Taps with their norm.

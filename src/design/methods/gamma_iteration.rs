@@ -11,19 +11,34 @@ use crate::lti::LtiError;
 use crate::lti::peak::{Peak, hinf_norm};
 use std::rc::Rc;
 
-/// Shares of [`GAMMA_ACCURACY`], which add up to less than one with the bracket: what a computed norm may
-/// exceed the gamma that a filter was promised for.
-const NORM_SHARE: f64 = 0.1;
-/// How far above the lower bound it is tried: a filter there is accurate enough.
-const LOWER_BOUND_SHARE: f64 = 0.8;
-/// Width of the bracket that ends the bisection.
-const BRACKET_SHARE: f64 = 0.5;
-/// Gammas below this fraction of ||W|| count as zero: the references are reproduced up to rounding errors.
-const ZERO_GAMMA: f64 = 1e-12;
+/// What gamma-iteration tolerates. The shares are of [`GAMMA_ACCURACY`], the accuracy that is promised.
+struct Settings {
+    /// What a computed norm may exceed the gamma that a filter was promised for. It adds up to less than
+    /// one with the bracket.
+    norm_share: f64,
+    /// How far above the lower bound is tried first: a filter there is accurate enough.
+    lower_bound_share: f64,
+    /// Width of the bracket that ends the bisection.
+    bracket_share: f64,
+    /// Gammas below this fraction of ||W|| count as zero: the references are reproduced up to rounding
+    /// errors.
+    zero_gamma: f64,
+    /// Relative distance below the least gamma found at which a more precise solver must find no filter:
+    /// four times the accuracy, so that rounding does not decide.
+    confirmed_below: f64,
+}
+
+/// Of every iteration.
+const SETTINGS: Settings = Settings {
+    norm_share: 0.1,
+    lower_bound_share: 0.8,
+    bracket_share: 0.5,
+    zero_gamma: 1e-12,
+    confirmed_below: 2e-6,
+};
+
 /// The bracket halves (on the logarithmic scale) in each trial.
 const TRIAL_LIMIT: usize = 80;
-/// Relative distance below the least gamma found at which a more precise solver must find no filter.
-const CONFIRMED_BELOW: f64 = 2e-6;
 
 /// Filters with the norm of their error system.
 #[derive(Debug, Clone)]
@@ -65,20 +80,21 @@ impl<'a> GammaIteration<'a> {
             lower: noncausal.gain.max(feedthrough),
             best: None,
             stop: stop.clone(),
-            negligible: ZERO_GAMMA * (system.c().norm() * system.b().norm() + system.d().norm()),
+            negligible: SETTINGS.zero_gamma * (system.c().norm() * system.b().norm() + system.d().norm()),
         })
     }
 
     /// Whether the least gamma found is zero or that of a bound on all causal filters, up to the accuracy.
     pub(super) fn attains_a_bound(&self) -> bool {
         let bound = self.noncausal.gain.max(self.feedthrough);
-        self.is_negligible(self.upper()) || (self.done() && self.upper() * (1.0 - CONFIRMED_BELOW) <= bound)
+        self.is_negligible(self.upper())
+            || (self.done() && self.upper() * (1.0 - SETTINGS.confirmed_below) <= bound)
     }
 
     /// Whether the search has ended and `solver`, which is more precise, finds no filter for a smaller
     /// gamma.
     pub(super) fn is_confirmed_by(&self, solver: &dyn RiccatiSolver) -> bool {
-        let below = self.upper() * (1.0 - CONFIRMED_BELOW);
+        let below = self.upper() * (1.0 - SETTINGS.confirmed_below);
         self.done() && matches!(solver.h_infinity(below), Trial::Impossible)
     }
 
@@ -151,7 +167,8 @@ impl<'a> GammaIteration<'a> {
             match solver.h_infinity(gamma) {
                 Trial::Achieved(filters) => {
                     let Some(found) = self.evaluate(filters.clone())? else { continue };
-                    let promise_kept = found.peak.gain <= gamma * (1.0 + NORM_SHARE * GAMMA_ACCURACY);
+                    let promise_kept =
+                        found.peak.gain <= gamma * (1.0 + SETTINGS.norm_share * GAMMA_ACCURACY);
                     self.keep(found);
                     if promise_kept {
                         return Ok(Trial::Achieved(filters));
@@ -167,7 +184,7 @@ impl<'a> GammaIteration<'a> {
     /// In most problems a causal filter achieves the noncausal bound, so it is tried first.
     pub(super) fn try_the_lower_bound(&mut self) -> Result<(), DesignError> {
         if !self.done() {
-            self.attempt(self.lower * (1.0 + LOWER_BOUND_SHARE * GAMMA_ACCURACY))?;
+            self.attempt(self.lower * (1.0 + SETTINGS.lower_bound_share * GAMMA_ACCURACY))?;
         }
         Ok(())
     }
@@ -176,7 +193,7 @@ impl<'a> GammaIteration<'a> {
     pub(super) fn bisect(&mut self) -> Result<(), DesignError> {
         let (mut floor, mut ceiling) = (self.floor(), self.ceiling()?);
         for _ in 0..TRIAL_LIMIT {
-            if self.done() || ceiling <= floor * (1.0 + BRACKET_SHARE * GAMMA_ACCURACY) {
+            if self.done() || ceiling <= floor * (1.0 + SETTINGS.bracket_share * GAMMA_ACCURACY) {
                 break;
             }
             let gamma = (floor * ceiling).sqrt();

@@ -37,7 +37,7 @@ pub(crate) fn synthesise(plant: &LiftedPlant, stop: &Stop) -> Result<Synthesis, 
         true => None,
         false => precise::<DoubleDouble>(&noisy, MOST_STATES_AT_106_BITS)?,
     };
-    let faint = innovations.iter().any(|form| form.least_feedthrough() < FAINT_FEEDTHROUGH);
+    let faint = innovations.iter().any(|form| form.least_feedthrough < FAINT_FEEDTHROUGH);
     if (faint || precise_filter.is_none()) && !is_due(&candidates) {
         candidates.extend(precise::<Float512>(&noisy, MOST_STATES_AT_512_BITS)?);
     }

@@ -30,16 +30,24 @@ use crate::lti::StateSpace;
 use nalgebra::DMatrix as Matrix;
 use std::ops::Range;
 
-/// Rounding moves no eigenvalue of a scaled semidefinite matrix this far below zero.
-const SEMIDEFINITE: f64 = 1e-15;
-/// Share of white noise in the filter's states in the choice of coordinates, or 100 roundings if these are
-/// more. With it no driven state is unreachable.
-const STATE_NOISE: f64 = 1e-40;
-/// Relative change of the covariance in one more step of the difference equation beyond which digits were
-/// lost.
-const FIXED_POINT_ACCURACY: f64 = 1e-7;
-/// Part of a state's power per period below which its covariance counts as zero there.
-const ZERO_COVARIANCE: f64 = 1e-10;
+/// What the solver of extended precision takes for rounding.
+struct Settings {
+    /// Rounding moves no eigenvalue of a scaled semidefinite matrix this far below zero.
+    semidefinite: f64,
+    /// Share of white noise in the filter's states in the choice of coordinates, or 100 roundings if these
+    /// are more. With it no driven state is unreachable.
+    state_noise: f64,
+    /// Relative change of the covariance in one more step of the difference equation beyond which digits
+    /// were lost: half of those of a double.
+    fixed_point_accuracy: f64,
+    /// Part of a state's power per period below which its covariance counts as zero there: a state that the
+    /// measurements determine.
+    zero_covariance: f64,
+}
+
+/// Of every equation.
+const SETTINGS: Settings =
+    Settings { semidefinite: 1e-15, state_noise: 1e-40, fixed_point_accuracy: 1e-7, zero_covariance: 1e-10 };
 
 /// The plant in extended precision.
 pub(super) struct PreciseFiltering<F> {
@@ -152,9 +160,9 @@ impl<F: Float> PreciseFiltering<F> {
         let RiccatiStep { next, innovation, .. } = self.step(covariance, Some(gamma))?;
         let change = |i: usize| (next[(i, i)] - covariance[(i, i)]).nearest().abs();
         let size = |i: usize| {
-            covariance[(i, i)].nearest().abs() + ZERO_COVARIANCE * self.input_gram[(i, i)].nearest()
+            covariance[(i, i)].nearest().abs() + SETTINGS.zero_covariance * self.input_gram[(i, i)].nearest()
         };
-        let settled = self.states().all(|i| change(i) <= FIXED_POINT_ACCURACY * size(i));
+        let settled = self.states().all(|i| change(i) <= SETTINGS.fixed_point_accuracy * size(i));
         let pivots: Vec<f64> = dense::pivots(&innovation).into_iter().map(Float::nearest).collect();
         if !settled || !pivots.iter().all(|pivot| pivot.is_finite()) {
             return None;
@@ -185,7 +193,7 @@ impl<F: Float> PreciseFiltering<F> {
         let driven = Matrix::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] * F::from(self.sizes[j]));
         let squares = symmetric(&product(&driven, &driven.transpose()));
         let mut gramian = riccati_limit(a, &dense::zeros(a.nrows(), a.nrows()), &squares)?;
-        let noise = F::from(STATE_NOISE.max(100.0 * F::ROUNDING));
+        let noise = F::from(SETTINGS.state_noise.max(100.0 * F::ROUNDING));
         (0..gramian.nrows()).for_each(|i| gramian[(i, i)] = gramian[(i, i)] + gramian[(i, i)] * noise);
         let root = dense::cholesky(&gramian)?;
         let (a, b) = (dense::solve_lower(&root, &product(a, &root)), dense::solve_lower(&root, b));
@@ -205,7 +213,7 @@ impl<F: Float> RiccatiSolver for PreciseFiltering<F> {
     }
 }
 
-/// Whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below -[`SEMIDEFINITE`].
+/// Whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below -[`Settings::semidefinite`].
 fn is_semidefinite<F: Float>(m: &Matrix<F>) -> bool {
     let kept: Vec<usize> = (0..m.nrows()).filter(|&i| m[(i, i)].nearest() != 0.0).collect();
     if kept.iter().any(|&i| m[(i, i)].nearest() < 0.0) {
@@ -214,7 +222,7 @@ fn is_semidefinite<F: Float>(m: &Matrix<F>) -> bool {
     let scale: Vec<F> = kept.iter().map(|&i| F::from(1.0) / m[(i, i)].sqrt()).collect();
     let scaled = Matrix::from_fn(kept.len(), kept.len(), |i, j| {
         let entry = m[(kept[i], kept[j])] * scale[i] * scale[j];
-        if i == j { entry + F::from(SEMIDEFINITE) } else { entry }
+        if i == j { entry + F::from(SETTINGS.semidefinite) } else { entry }
     });
     dense::cholesky(&scaled).is_some()
 }

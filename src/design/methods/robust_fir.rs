@@ -21,8 +21,20 @@ use crate::lti::FirMatrix;
 use crate::spec::{ErrorBox, Method, Spec};
 use crate::units::Seconds;
 
-/// A nominal bank whose largest gain is within this of a lower bound is kept.
-const NO_GAIN: f64 = 1e-3;
+/// What a robust design tolerates.
+struct Settings {
+    /// A nominal bank whose largest gain is within this of a lower bound is kept: nobody sees 0.01 dB.
+    no_gain: f64,
+    /// Relative width of the interval of the worst norm over the scenarios: 0.001 dB, as each round costs a
+    /// search of the box.
+    norm_accuracy: f64,
+    /// Relative margin of that norm for the least mean square without errors: twice its accuracy, or
+    /// nothing could be gained.
+    norm_margin: f64,
+}
+
+/// Of every design.
+const SETTINGS: Settings = Settings { no_gain: 1e-3, norm_accuracy: 1e-4, norm_margin: 2e-4 };
 
 /// The comparison of a robust design with one that takes the errors for zero.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -65,7 +77,7 @@ pub(crate) fn synthesise(
     let front_ends = BoxPlant::new(plant.problem(), errors)?;
     let search = BoxSearch::new(front_ends, tap_lags(plant.ratio(), settings.taps)[0], &[])?;
     let study = study_of(&nominal, &search)?;
-    if study.nominal.largest_found <= study.lower * (1.0 + NO_GAIN) {
+    if study.nominal.largest_found <= study.lower * (1.0 + SETTINGS.no_gain) {
         return Ok(Synthesis { robust: Some(study), ..nominal });
     }
     let (study, found) = least_worst_norm(plant, search, settings, study)?;
@@ -80,9 +92,9 @@ pub(crate) fn synthesise(
 fn study_of(nominal: &Synthesis, search: &BoxSearch) -> Result<RobustStudy, DesignError> {
     let worst = search.worst(&nominal.filters)?;
     // Whatever the taps, each combination of errors alone has the error that no bank avoids.
-    let unavoidable = search.plant().moved(&worst.point).noncausal_bound()?.gain;
+    let unavoidable = search.plant.moved(&worst.point).noncausal_bound()?.gain;
     let norms = RobustNorms { nominal: nominal.peak.gain, largest_found: worst.peak.gain };
-    let errors = search.plant().errors.in_seconds(search.plant().fast_period());
+    let errors = search.plant.errors.in_seconds(search.plant.problem.fast_period);
     Ok(RobustStudy {
         errors,
         robust: norms,
@@ -104,10 +116,10 @@ fn least_worst_norm(
     let mut exchange = exchange(plant, search, settings)?;
     let mut rounds = 0;
     let (taps, largest_found) = loop {
-        let found = exchange.optimise_at(Tolerances::gradual(NORM_ACCURACY))?;
+        let found = exchange.optimise_at(Tolerances::gradual(SETTINGS.norm_accuracy))?;
         let taps = found.taps.impulse_responses(settings.taps);
         let worst = exchange.error.search.worst(&SynthesisFilters::Fir(taps.clone()))?;
-        let enough = found.estimate.max(exchange.lower) * (1.0 + NORM_ACCURACY);
+        let enough = found.estimate.max(exchange.lower) * (1.0 + SETTINGS.norm_accuracy);
         rounds += 1;
         if worst.peak.gain <= enough || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
             break (taps, worst.peak.gain);
@@ -142,8 +154,8 @@ impl AffineError for BoxError {
     type Scenario = Combination;
 
     fn at(&self, location: &GridFrequency<Combination>) -> FrequencyPoint {
-        let response = self.search.plant().response(location.frequency);
-        let h = self.search.plant().measurements(&response, &location.scenario);
+        let response = self.search.plant.response(location.frequency);
+        let h = self.search.plant.measurements(&response, &location.scenario);
         let count = h.nrows();
         let g = linalg::lq_factor(&linalg::vstack(&[&h, &response.references]));
         let rows = |first: usize, rows: usize| -> CMat {
@@ -165,20 +177,15 @@ fn exchange(
     let lags = tap_lags(plant.ratio(), settings.taps);
     let (points, weights) = ErrorGrid::new(plant, lags[0])?.coarse();
     let noise = plant.problem().noise.clone();
-    let margin = settings.gamma_margin.unwrap_or(NORM_MARGIN).max(NORM_MARGIN);
+    let margin = settings.gamma_margin.unwrap_or(SETTINGS.norm_margin).max(SETTINGS.norm_margin);
     let problem = SampledProblem::new(points, lags);
-    let without_errors = std::iter::repeat(vec![0; search.plant().errors.delays.len()]);
+    let without_errors = std::iter::repeat(vec![0; search.plant.errors.delays.len()]);
     let error = BoxError { search, inputs: plant.channels() + plant.ratio() };
     let objective = MeanSquareObjective { weights, noise };
     let mut exchange = Exchange::new(error, problem, without_errors, objective, margin);
     exchange.stop = settings.stop.clone();
     Ok(exchange)
 }
-
-/// Relative width of the interval of the worst norm over the scenarios.
-const NORM_ACCURACY: f64 = 1e-4;
-/// Relative margin of that norm for the least mean square without errors.
-const NORM_MARGIN: f64 = 2e-4;
 
 /// The norms of a bank, computed (h = 1).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]

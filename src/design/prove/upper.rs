@@ -20,6 +20,27 @@ use crate::verify::enclosed::PreciseErrorSystem;
 use crate::verify::{EnclosedErrorSystem, Midpoint, ZERO_NORM};
 use nalgebra::DMatrix as Matrix;
 
+/// What the search for a certificate tolerates.
+struct Settings {
+    /// Part of the excess that white noise on the states may take there: it leaves nearly all to the
+    /// certificate.
+    noise_share_of_excess: f64,
+    /// Noise added to every state in the choice of coordinates, relative to the root of gamma and its
+    /// excess (and of the number of states). With it no direction is unobservable. The noise would raise
+    /// the norm by only a hundredth of the excess.
+    state_noise: f64,
+    /// Relative excess of a stated norm over the one computed here that counts as rounding: the norm is a
+    /// peak of differences.
+    same_norm: f64,
+    /// Relative distance of the enclosed gain at the peak from the norm above which double precision does
+    /// not resolve the norm.
+    resolved_norm_gap: f64,
+}
+
+/// Of every search.
+const SETTINGS: Settings =
+    Settings { noise_share_of_excess: 1e-3, state_noise: 0.1, same_norm: 1e-6, resolved_norm_gap: 1e-7 };
+
 /// Relative excesses over the computed norm at which the search tries to find a certificate, smallest
 /// first.
 pub(super) const EXCESSES: [f64; 8] = [1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1];
@@ -38,20 +59,9 @@ const STATE_WEIGHTS: [f64; 2] = [1e-1, 1e-4];
 const DIGITS: [usize; 4] = [9, 12, 15, 17];
 /// Significant digits of the corrections.
 const CORRECTION_DIGITS: [usize; 2] = [9, 17];
-/// Part of the excess that white noise on the states may take there.
-const NOISE_SHARE_OF_EXCESS: f64 = 1e-3;
 /// Maximum number of states of an error system for which the search tries to find a certificate. It needs
 /// eigenvalues of matrices twice as large.
 const MAX_SEARCHED_STATES: usize = 512;
-/// Noise added to every state in the choice of coordinates, relative to the root of gamma and its excess
-/// (and of the number of states). With it no direction is unobservable. The noise would raise the norm by
-/// only a hundredth of the excess.
-const STATE_NOISE: f64 = 0.1;
-/// Relative excess of a stated norm over the one computed here that counts as rounding.
-const SAME_NORM: f64 = 1e-6;
-/// Relative distance of the enclosed gain at the peak from the norm above which double precision does not
-/// resolve the norm.
-const RESOLVED_NORM_GAP: f64 = 1e-7;
 
 /// The certificate with the least gamma, of those tried until `stop` is due, that passes.
 pub(super) fn certificate(
@@ -73,12 +83,12 @@ pub(super) fn certificate(
     // The norm in the file may differ from the one computed here in the last digits; if the difference is
     // larger, the stated number is not the norm.
     let stated = bank.gamma.norm.map(|stated| stated / units.reference);
-    let credible = stated.filter(|&stated| stated <= peak.gain * (1.0 + SAME_NORM));
+    let credible = stated.filter(|&stated| stated <= peak.gain * (1.0 + SETTINGS.same_norm));
     let mut norm = credible.unwrap_or(0.0).max(peak.gain);
     let floor = ZERO_NORM * error.scale() / units.reference;
     let shown = error.attains(&peak_witness).unwrap_or(0.0) / units.reference;
     if norm > floor
-        && (shown - norm).abs() > RESOLVED_NORM_GAP * norm
+        && (shown - norm).abs() > SETTINGS.resolved_norm_gap * norm
         && let Some((gain, enclosed)) = EnclosedGains(error).peak(None)?
     {
         (norm, peak_witness) = (gain / units.reference, enclosed);
@@ -171,7 +181,7 @@ impl Certifier<'_> {
 
     /// In numbers of so many words, R as two doubles per entry where one does not do.
     fn of_long<const WORDS: usize>(&self, long: &LongSystem, level: TrialGamma) -> Option<Certificate> {
-        let noise = NOISE_SHARE_OF_EXCESS * level.excess;
+        let noise = SETTINGS.noise_share_of_excess * level.excess;
         let [factor, correction] = long.root::<WORDS>(level.middle(), noise)?;
         let passes = |correction| self.passes(level, factor.clone(), correction);
         let corrected = || CORRECTION_DIGITS.iter().find_map(|&digits| passes(rounded(&correction, digits)));
@@ -185,7 +195,7 @@ pub(super) fn in_doubles<T>(
     level: TrialGamma,
     passes: impl Fn(Vec<Vec<f64>>) -> Option<T>,
 ) -> Result<Option<T>, DesignError> {
-    let noise = STATE_NOISE * (level.excess * level.gamma()).sqrt();
+    let noise = SETTINGS.state_noise * (level.excess * level.gamma()).sqrt();
     let riccati = Riccati::new(middle, noise)?;
     let tried = |weight: &f64| {
         let factor = riccati.factor(level.middle(), weight * level.excess)?;

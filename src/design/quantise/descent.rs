@@ -1,6 +1,7 @@
 //! Descent on gamma itself: one tap or a pair of taps changes by one step.
 
 use super::lattice::IntegerSpan;
+use super::settings::SETTINGS;
 use crate::design::DesignError;
 use crate::design::limits::Stop;
 use crate::linalg::{self, CMat, Complex};
@@ -9,8 +10,6 @@ use crate::lti::FirMatrix;
 
 /// Moves tried in pairs: those that lower the error at the worst frequency most.
 const MOVES_IN_PAIRS: usize = 48;
-/// A move must remove this fraction of the excess over gamma of the real taps.
-const LEAST_EXCESS_REMOVED: f64 = 0.02;
 /// Rounds of single moves and pairs.
 const ROUNDS: usize = 16;
 
@@ -123,7 +122,7 @@ impl<'a> Descent<'a> {
     }
 
     fn make_if_better(&mut self, moves: &[Move]) -> Result<bool, DesignError> {
-        let bar = self.worst - LEAST_EXCESS_REMOVED * (self.worst - self.real).max(0.0);
+        let bar = self.worst - SETTINGS.least_excess_removed * (self.worst - self.real).max(0.0);
         // The worst points come first, because they reject most moves.
         for &k in &self.order {
             if self.gain_after(k, moves)? > bar {

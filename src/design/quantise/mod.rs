@@ -18,6 +18,7 @@ mod lattice;
 mod problem;
 mod quantiser;
 mod search;
+mod settings;
 
 pub(super) use choice::{Allowance, quantise_within};
 pub(super) use problem::QuantisationProblem;

@@ -8,6 +8,7 @@
 //! Q[(i, j), (i', j')] = sum_k w_k Re( e^{-i omega_k (j - j')} (H H*)[i, i'] )
 //! ```
 
+use super::settings::SETTINGS;
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::design::error_grid::ErrorGrid;
@@ -45,11 +46,6 @@ pub(super) struct RoundedTaps {
     pub(super) mean_square: f64,
 }
 
-/// Mean squares below this, relative to that of zero taps, are zero up to rounding.
-const ZERO_MEAN_SQUARE: f64 = 1e-20;
-/// Share of the gamma of zero output below which gamma is rounding of the sums of target and filters.
-const ZERO_GAMMA: f64 = 4.0 * f64::EPSILON;
-
 /// Estimates of the error of integer taps, on a grid of frequencies.
 pub(super) struct TapError<'a> {
     pub(super) problem: QuantisationProblem<'a>,
@@ -81,8 +77,8 @@ impl<'a> TapError<'a> {
         let forms = Forms::new(&points);
         let real_gamma = grid.gamma(&fir)?;
         let zeros = FirMatrix::polyphase(&vec![vec![0.0; problem.taps[0].len()]; problem.taps.len()], ratio);
-        let least_gamma = ZERO_GAMMA * grid.gamma(&zeros)?;
-        let least_mean_square = ZERO_MEAN_SQUARE * grid.mean_square(&zeros);
+        let least_gamma = SETTINGS.zero_gamma * grid.gamma(&zeros)?;
+        let least_mean_square = SETTINGS.zero_mean_square * grid.mean_square(&zeros);
         let real = grid.mean_square(&fir) + output_noise(problem.noise, problem.taps);
         let real_mean_square = real.max(least_mean_square);
         Ok(Self {
@@ -163,10 +159,6 @@ fn output_noise(noise: &[f64], taps: &[Vec<f64>]) -> f64 {
         .sum()
 }
 
-/// Added to the diagonal, because the form is singular for equal channels. Relative to each entry, because
-/// channels may differ by many decades.
-const RIDGE: f64 = 1e-12;
-
 /// A tap of a phase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Tap {
@@ -235,7 +227,7 @@ impl Correlations {
         let mut form = Mat::from_fn(n, n, |r, c| self.between(taps[r], taps[c]));
         for (i, tap) in taps.iter().enumerate() {
             form[(i, i)] += noise(powers, tap.channel);
-            form[(i, i)] += RIDGE * form[(i, i)] + f64::MIN_POSITIVE;
+            form[(i, i)] += SETTINGS.ridge * form[(i, i)] + f64::MIN_POSITIVE;
         }
         form
     }

@@ -3,23 +3,17 @@
 use super::lattice::IntegerSpan;
 use super::problem::{QuantisationProblem, RoundedTaps, TapError};
 use super::search::LatticeSearch;
+use super::settings::SETTINGS;
 use super::{WordLoss, decades};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::spec::{MAX_FRACTION_BITS, WordLengths};
 use rayon::prelude::*;
 
-/// Relative difference of gamma below which the mean square decides: 0.001 dB.
-pub(super) const GAMMA_TIE: f64 = 1e-4;
-/// Integers that lower the gamma of zero output by less than this share do no better than zero output.
-const LEAST_EFFECT_OF_INTEGERS: f64 = 1e-6;
-/// Real taps that lower it by more than this share have an effect, which integers should have too.
-const LEAST_EFFECT_OF_REAL_TAPS: f64 = 1e-3;
-
 impl RoundedTaps {
     /// Whether gamma is smaller, or about equal with a smaller mean square.
     pub(super) fn is_better(&self, other: &Self, gamma_margin: f64) -> bool {
-        let alike = 1.0 + gamma_margin.max(GAMMA_TIE);
+        let alike = 1.0 + gamma_margin.max(SETTINGS.gamma_tie);
         self.gamma * alike < other.gamma
             || self.gamma < other.gamma * alike && self.mean_square < other.mean_square
     }
@@ -88,7 +82,7 @@ impl<'a> TapQuantiser<'a> {
         if found.iter().any(|found| self.keeps(found)) {
             found.retain(|found| self.keeps(found));
             let least = found.iter().map(|found| found.gamma).fold(f64::INFINITY, f64::min);
-            let alike = least * (1.0 + self.error.problem.gamma_margin.max(GAMMA_TIE));
+            let alike = least * (1.0 + self.error.problem.gamma_margin.max(SETTINGS.gamma_tie));
             let cap = alike.min(of_zero_output.max(least));
             found.retain(|found| found.gamma <= cap);
         }
@@ -113,8 +107,8 @@ impl<'a> TapQuantiser<'a> {
         let fixed_point = &found.fixed_point;
         let zeros = fixed_point.integers.iter().map(|list| vec![0; list.len()]).collect();
         let zero_output = self.error.gamma(&FixedPoint { integers: zeros, ..fixed_point.clone() })?;
-        Ok(found.gamma >= zero_output * (1.0 - LEAST_EFFECT_OF_INTEGERS)
-            && self.error.real_gamma < zero_output * (1.0 - LEAST_EFFECT_OF_REAL_TAPS))
+        Ok(found.gamma >= zero_output * (1.0 - SETTINGS.least_effect_of_integers)
+            && self.error.real_gamma < zero_output * (1.0 - SETTINGS.least_effect_of_real_taps))
     }
 
     /// Whether the mean square is as small as it should be.

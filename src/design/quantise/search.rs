@@ -3,6 +3,7 @@
 use super::descent::Descent;
 use super::lattice::{IntegerSpan, closest};
 use super::problem::{RoundedTaps, Tap, TapError};
+use super::settings::SETTINGS;
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
 use crate::lti::FirMatrix;
@@ -10,12 +11,6 @@ use crate::spec::WordLengths;
 
 /// Rounds of reweighting: with one, banks of `filters/` lose up to 2 dB more.
 const ROUNDS: usize = 12;
-/// Fraction of the weights that a round replaces.
-const REPLACED_SHARE: f64 = 0.2;
-/// Weight of the worst frequency, relative to the uniform weights of the start.
-const EMPHASIS: f64 = 3.0;
-/// Relative excess over the gamma of the real taps that counts as none: 0.0002 dB.
-const NEGLIGIBLE_LOSS: f64 = 2e-5;
 /// Integers as doubles, one list per channel.
 type Integers = Vec<Vec<f64>>;
 
@@ -62,7 +57,7 @@ impl<'a> LatticeSearch<'a> {
         let fir = FirMatrix::polyphase(&start.taps(), self.error.ratio);
         let real = self.error.real_gamma;
         let descent = Descent::new(points, &self.spans, start.step(), integers, &fir, real)?;
-        Ok(self.fixed_point(&descent.run(NEGLIGIBLE_LOSS, self.error.problem.stop)?))
+        Ok(self.fixed_point(&descent.run(SETTINGS.negligible_loss, self.error.problem.stop)?))
     }
 
     /// All taps zero.
@@ -89,12 +84,13 @@ impl<'a> LatticeSearch<'a> {
             let fir = FirMatrix::polyphase(&candidate.fixed_point.taps(), self.error.ratio);
             let excess_of_worst = candidate.gamma - real;
             found.push(candidate);
-            if excess_of_worst <= NEGLIGIBLE_LOSS * real {
+            if excess_of_worst <= SETTINGS.negligible_loss * real {
                 break;
             }
             for (weight, gain) in weights.iter_mut().zip(self.error.grid.gains(&fir)?) {
                 let excess = ((gain - real) / excess_of_worst).max(0.0);
-                *weight = (1.0 - REPLACED_SHARE) * *weight + REPLACED_SHARE * EMPHASIS * excess * excess;
+                *weight = (1.0 - SETTINGS.replaced_share) * *weight
+                    + SETTINGS.replaced_share * SETTINGS.emphasis * excess * excess;
             }
         }
         Ok(())

@@ -1,5 +1,5 @@
-use super::quantiser::GAMMA_TIE;
 use super::search::LatticeSearch;
+use super::settings::SETTINGS;
 use super::*;
 use crate::bank::SynthesisFilters;
 use crate::design::error_grid::ErrorGrid;
@@ -75,7 +75,7 @@ fn small_banks_reach_what_trying_all_integers_reaches() {
         let search = LatticeSearch::new(&quantiser.error, &words, scale);
         let all = brute_force(&plant, &search.rounded(), 1);
         assert!(found.gamma <= all * 1.001, "{bits} bits: {} found, {all} is there", found.gamma);
-        assert!(found.gamma <= quantiser.rounded(&words, None).unwrap() * (1.0 + GAMMA_TIE));
+        assert!(found.gamma <= quantiser.rounded(&words, None).unwrap() * (1.0 + SETTINGS.gamma_tie));
     }
 }
 
@@ -167,7 +167,7 @@ fn equal_channels_share_finer_steps_than_their_own() {
     let (plant, taps) = optimum(&twice);
     let (quantiser, words) = (quantiser(&plant, &taps).unwrap(), WordLengths::Same(4));
     let found = quantiser.quantise(&words, None).unwrap();
-    assert!(found.gamma <= quantiser.rounded(&words, None).unwrap() * (1.0 + GAMMA_TIE));
+    assert!(found.gamma <= quantiser.rounded(&words, None).unwrap() * (1.0 + SETTINGS.gamma_tie));
 }
 
 #[test]

@@ -11,6 +11,7 @@
 
 mod order_search;
 mod plant_samples;
+mod settings;
 mod truncation;
 
 use crate::design::DesignError;

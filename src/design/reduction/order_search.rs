@@ -1,6 +1,7 @@
 //! The order search: weighted truncations of the full bank, each with its best output matrices.
 
 use super::plant_samples::PlantSamples;
+use super::settings::SETTINGS;
 use super::truncation::{ReducedRecursion, balanced, mean_square_bank};
 use super::{Aim, OrderErrorPoint, OrderReduction, ReductionErrors, ReductionProblem};
 use crate::design::DesignError;
@@ -11,10 +12,6 @@ use std::collections::BTreeMap;
 
 /// Orders on each side of the chosen one in the order/error trade-off.
 const BESIDE: usize = 2;
-/// Losses below this are rounding errors, in decibels.
-const ROUNDING_DB: f64 = 5e-5;
-/// Errors below this fraction of the plant's gain count as zero.
-const ZERO_ERROR: f64 = 1e-12;
 
 /// The bank found for an order.
 #[derive(Debug, Clone)]
@@ -43,7 +40,7 @@ impl<'a> OrderSearch<'a> {
             balanced: balanced(problem.plant, problem.bank)?,
             full: figures(problem, problem.bank)?,
             banks: BTreeMap::new(),
-            zero: ZERO_ERROR * (system.c().norm() * system.b().norm() + system.d().norm()),
+            zero: SETTINGS.zero_error * (system.c().norm() * system.b().norm() + system.d().norm()),
         })
     }
 
@@ -59,7 +56,7 @@ impl<'a> OrderSearch<'a> {
         while low < high && !self.problem.stop.is_due() {
             let middle = low + (high - low) / 2;
             self.visit(middle)?;
-            if self.loss_of(middle) <= db + ROUNDING_DB { high = middle } else { low = middle + 1 }
+            if self.loss_of(middle) <= db + SETTINGS.rounding_db { high = middle } else { low = middle + 1 }
         }
         Ok(high)
     }

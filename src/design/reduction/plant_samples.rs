@@ -1,6 +1,7 @@
 //! Output matrices of least gamma for a given recursion. The error W - F H is affine in them, so that they
 //! solve a convex problem at sampled frequencies.
 
+use super::settings::SETTINGS;
 use super::truncation::ReducedRecursion;
 use crate::design::DesignError;
 use crate::design::error_grid::{AffineError, GridFrequency, LocatedPeak};
@@ -16,8 +17,6 @@ use std::f64::consts::PI;
 const GRID: usize = 32;
 /// Further frequencies, halving from pi/GRID towards 0, for slow analog filters.
 const TOWARDS_ZERO: usize = 6;
-/// Frequencies closer than this are one, in radians.
-const LEAST_DISTANCE: f64 = 1e-9;
 
 /// The plant at the frequencies of the worst-case problem.
 #[derive(Debug, Clone)]
@@ -46,7 +45,7 @@ impl<'a> PlantSamples<'a> {
 
     /// Adds a frequency, unless it is known.
     fn add(&mut self, omega: f64) {
-        if self.samples.iter().all(|known| (known.omega - omega).abs() >= LEAST_DISTANCE) {
+        if self.samples.iter().all(|known| (known.omega - omega).abs() >= SETTINGS.least_distance) {
             self.samples.push(self.plant.at(omega));
         }
     }

@@ -4,16 +4,12 @@
 //! Output matrices of least mean square for a given recursion. The error W - F H is affine in them, so that
 //! one projection gives them.
 
+use super::settings::SETTINGS;
 use crate::design::DesignError;
 use crate::design::plant::LiftedPlant;
 use crate::linalg::{self, Mat};
 use crate::lti::StateSpace;
 use crate::lti::gramian::{balanced_when_driven, controllability_root};
-
-/// States below this share of the output are rounding errors.
-const ROUNDING_SHARE: f64 = 1e-12;
-/// Directions of the regressors below this share of the strongest are rounding errors.
-const RANK_TOLERANCE: f64 = 1e-12;
 
 /// The recursion `x+ = a x + b u`.
 #[derive(Debug, Clone)]
@@ -48,7 +44,7 @@ impl ReducedRecursion {
 /// `bank` in states that are balanced when `plant` drives it, those with the largest effect first.
 pub(super) fn balanced(plant: &LiftedPlant, bank: &StateSpace) -> Result<StateSpace, DesignError> {
     let state_root = state_covariance_root(plant, bank)?;
-    let floor = ROUNDING_SHARE * (bank.c() * &state_root).norm();
+    let floor = SETTINGS.rounding_share * (bank.c() * &state_root).norm();
     Ok(balanced_when_driven(bank, &state_root, floor)?)
 }
 
@@ -84,7 +80,7 @@ fn projection(x: &Mat, z: &Mat) -> Result<Mat, DesignError> {
     let mut unit = x.clone();
     unit.row_iter_mut().zip(&scale).for_each(|(mut row, s)| row *= *s);
     let svd = linalg::svd(&unit)?;
-    let floor = RANK_TOLERANCE * svd.s.first().copied().unwrap_or(0.0);
+    let floor = SETTINGS.rank_tolerance * svd.s.first().copied().unwrap_or(0.0);
     let mut components = z * &svd.v;
     components
         .column_iter_mut()

@@ -10,7 +10,7 @@ use crate::design::plant::LiftedPlant;
 use crate::design::problem::Problem;
 use crate::linalg::{CMat, Complex};
 use crate::spec::{ConverterErrors, ErrorBox, ErrorPoint};
-use crate::units::{FastPeriods, Seconds};
+use crate::units::FastPeriods;
 use std::ops::Range;
 
 /// Errors of a channel as shares of the half-width, beside none: of the delay and of the cut-off. The
@@ -31,15 +31,15 @@ pub(in crate::design) type Combination = Vec<usize>;
 /// All front ends of a box.
 #[derive(Debug)]
 pub(in crate::design) struct BoxPlant {
-    problem: Problem,
+    pub(in crate::design) problem: Problem,
     pub(in crate::design) errors: ErrorBox,
     /// Its measurements are the samples of the nodes.
-    plant: LiftedPlant,
+    pub(super) plant: LiftedPlant,
     nodes: Vec<UncertainConverter>,
     /// The samples of each converter in a frame.
     converters: Vec<Range<usize>>,
     /// For each converter.
-    options: Vec<Vec<ChannelError>>,
+    pub(super) options: Vec<Vec<ChannelError>>,
 }
 
 /// A converter with errors of its delay and cut-off, which all its samples share.
@@ -148,11 +148,6 @@ impl BoxPlant {
         })
     }
 
-    /// The options of each channel.
-    pub(super) fn options(&self) -> &[Vec<ChannelError>] {
-        &self.options
-    }
-
     /// Corners of the box: all, or [`MAX_CORNERS`] that differ from each other in half of the sides.
     pub(super) fn corners(&self) -> Vec<Combination> {
         let ends: Vec<Vec<usize>> = (0..self.options.len()).map(|i| self.ends(i)).collect();
@@ -194,24 +189,6 @@ impl BoxPlant {
         (0..options.len()).filter(|&choice| is_end(&options[choice])).collect()
     }
 
-    /// h.
-    pub(in crate::design) fn fast_period(&self) -> Seconds {
-        self.problem.fast_period
-    }
-
-    /// M.
-    pub(in crate::design) fn ratio(&self) -> usize {
-        self.plant.ratio()
-    }
-
-    /// The frequencies near the poles of all front ends, in radians per slow period.
-    ///
-    /// # Errors
-    /// [`DesignError::Lti`] if a front end is not stable.
-    pub(in crate::design) fn resonances(&self) -> Result<Vec<f64>, DesignError> {
-        self.plant.resonances()
-    }
-
     /// The errors of a combination.
     pub(in crate::design) fn point(&self, combination: &[usize]) -> ErrorPoint {
         let mut point = ErrorPoint::none(self.options.len());
@@ -234,7 +211,7 @@ impl BoxPlant {
         let count = self.plant.channels();
         BoxResponse {
             nodes: all.rows(0, count).into_owned(),
-            references: all.rows(count, self.ratio()).into_owned(),
+            references: all.rows(count, self.plant.ratio()).into_owned(),
         }
     }
 

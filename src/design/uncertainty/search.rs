@@ -11,25 +11,35 @@
 use super::box_plant::{BoxPlant, BoxResponse, Combination};
 use crate::bank::SynthesisFilters;
 use crate::design::DesignError;
-use crate::design::error_grid::{Frequencies, GridFrequency, LocatedPeak, PRUNE_LEVEL};
+use crate::design::error_grid::{self, Frequencies, GridFrequency, LocatedPeak};
 use crate::design::filters::FilterResponse;
 use crate::linalg::{self, CMat, Complex};
 use crate::lti::peak::{Peak, local_maxima, refine};
 use crate::spec::ErrorPoint;
 use std::cell::OnceCell;
 
+/// What the search of a box tolerates.
+struct Settings {
+    /// A step that raises the gain by less (relative) ends the climb: what is left of it is rounding.
+    least_step: f64,
+    /// Relative change of a gain at which the refinement of a peak ends: a hundredth of the accuracy of a
+    /// robust norm.
+    flat_gain: f64,
+    /// Share of the largest peak from which on others are followed between the nodes, too. Robust banks
+    /// have many that are nearly equal, and a node is off its peak by some percent.
+    near_worst: f64,
+}
+
+/// Of every search.
+const SETTINGS: Settings = Settings { least_step: 1e-9, flat_gain: 1e-6, near_worst: 0.9 };
+
 /// Steps of a climb; two or three suffice.
 const MAX_STEPS: usize = 16;
-/// A step that raises the gain by less (relative) ends the climb.
-const LEAST_STEP: f64 = 1e-9;
 /// Combinations that are carried from one frequency to the next.
 const CARRIED: usize = 3;
-/// Relative change of a gain at which the refinement of a peak ends.
-const FLAT_GAIN: f64 = 1e-6;
 /// Peaks that are followed between the nodes, and the share of the largest that they have at least. Robust
 /// banks have many that are nearly equal.
 const FOLLOWED: usize = 6;
-const NEAR_WORST: f64 = 0.9;
 /// Halvings of the distance of the nodes while a peak is followed, from a quarter of the half-width: a gain
 /// is flat at its peak.
 const HALVINGS: i32 = 6;
@@ -49,7 +59,7 @@ struct Attained {
 
 /// The search over one box.
 pub(in crate::design) struct BoxSearch {
-    plant: BoxPlant,
+    pub(in crate::design) plant: BoxPlant,
     frequencies: Frequencies,
     responses: Vec<OnceCell<BoxResponse>>,
     corners: Vec<Combination>,
@@ -65,14 +75,9 @@ impl BoxSearch {
         lags: usize,
         resonances: &[f64],
     ) -> Result<Self, DesignError> {
-        let frequencies = Frequencies::new(lags, &[&plant.resonances()?, resonances].concat());
+        let frequencies = Frequencies::new(lags, &[&plant.plant.resonances()?, resonances].concat());
         let responses = frequencies.all.iter().map(|_| OnceCell::new()).collect();
         Ok(Self { corners: plant.corners(), plant, frequencies, responses })
-    }
-
-    /// The front ends.
-    pub(in crate::design) fn plant(&self) -> &BoxPlant {
-        &self.plant
     }
 
     /// Makes the errors of `point` a combination; see [`BoxPlant::include`].
@@ -92,8 +97,8 @@ impl BoxSearch {
             let peak = self.plant.moved(&point).bank_norm(filters)?;
             Ok::<_, DesignError>(WorstErrors { point, peak })
         };
-        let without_errors = at(ErrorPoint::none(self.plant.options().len()))?;
-        let response = FilterResponse::new(filters, self.plant.ratio())?;
+        let without_errors = at(ErrorPoint::none(self.plant.options.len()))?;
+        let response = FilterResponse::new(filters, self.plant.plant.ratio())?;
         self.worst_points(&response)?.into_iter().try_fold(without_errors, |worst, point| {
             let other = at(point)?;
             Ok(if other.peak.gain > worst.peak.gain { other } else { worst })
@@ -109,7 +114,7 @@ impl BoxSearch {
         filters: &FilterResponse,
         level: f64,
     ) -> Result<Vec<LocatedPeak<Combination>>, DesignError> {
-        let found = self.sweep(filters, PRUNE_LEVEL * level)?;
+        let found = self.sweep(filters, error_grid::SETTINGS.prune_level * level)?;
         self.peaks_among(&found, filters, level)
     }
 
@@ -126,7 +131,10 @@ impl BoxSearch {
             .map(|(found, &frequency)| Peak { gain: highest(found), frequency })
             .collect();
         let mut peaks: Vec<LocatedPeak<Combination>> = Vec::new();
-        for around in local_maxima(&grid).into_iter().filter(|[_, peak, _]| peak.gain > PRUNE_LEVEL * level) {
+        for around in local_maxima(&grid)
+            .into_iter()
+            .filter(|[_, peak, _]| peak.gain > error_grid::SETTINGS.prune_level * level)
+        {
             let k = self.frequencies.all.partition_point(|omega| *omega < around[1].frequency);
             for start in self.exchanged(&found[k], k, filters)? {
                 let peak = self.refined(&start.combination, around, filters)?;
@@ -143,7 +151,7 @@ impl BoxSearch {
     /// frequencies are left out.
     fn sweep(&self, filters: &FilterResponse, level: f64) -> Result<Vec<Vec<Attained>>, DesignError> {
         let mut all: Vec<Vec<Attained>> = vec![Vec::new(); self.frequencies.all.len()];
-        let mut carried = vec![vec![0; self.plant.options().len()]];
+        let mut carried = vec![vec![0; self.plant.options.len()]];
         for &k in &self.frequencies.first {
             let at = filters.at(self.frequencies.all[k]);
             let mut starts = self.worst_corners(self.response(k), &at)?;
@@ -205,10 +213,10 @@ impl BoxSearch {
         for Attained { mut gain, mut combination } in found.iter().cloned() {
             for i in 0..combination.len() {
                 let mut best = combination[i];
-                for choice in 0..self.plant.options()[i].len() {
+                for choice in 0..self.plant.options[i].len() {
                     combination[i] = choice;
                     let other = self.gain(response, &at, &combination)?;
-                    if other > gain * (1.0 + LEAST_STEP) {
+                    if other > gain * (1.0 + SETTINGS.least_step) {
                         (gain, best) = (other, choice);
                     }
                 }
@@ -243,7 +251,7 @@ impl BoxSearch {
         };
         let [low, middle, high] = around;
         let around = [at(low.frequency)?, at(middle.frequency)?, at(high.frequency)?];
-        refine(at, around, FLAT_GAIN)
+        refine(at, around, SETTINGS.flat_gain)
     }
 
     fn response(&self, k: usize) -> &BoxResponse {
@@ -257,7 +265,7 @@ impl BoxSearch {
     fn worst_points(&self, filters: &FilterResponse) -> Result<Vec<ErrorPoint>, DesignError> {
         let found = self.sweep(filters, 0.0)?;
         let most = found.iter().map(|found| highest(found)).fold(0.0, f64::max);
-        let mut peaks = self.peaks_among(&found, filters, NEAR_WORST * most)?;
+        let mut peaks = self.peaks_among(&found, filters, SETTINGS.near_worst * most)?;
         peaks.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         let mut points: Vec<ErrorPoint> = Vec::new();
         for peak in peaks {
@@ -296,7 +304,7 @@ fn climb(
     let mut gain = 0.0;
     for _ in 0..MAX_STEPS {
         let svd = linalg::svd(&plant.error(response, filters, &combination))?;
-        if svd.s[0] <= gain * (1.0 + LEAST_STEP) {
+        if svd.s[0] <= gain * (1.0 + SETTINGS.least_step) {
             break;
         }
         gain = svd.s[0];
@@ -334,7 +342,7 @@ impl SingularPair {
         for i in 0..combination.len() {
             let own = combination[i];
             let mut best = (own, self.output(plant, combination));
-            for choice in 0..plant.options()[i].len() {
+            for choice in 0..plant.options[i].len() {
                 combination[i] = choice;
                 let output = self.output(plant, combination);
                 if output < best.1 {
@@ -349,7 +357,7 @@ impl SingularPair {
 
     /// Re (u* F H v).
     fn output(&self, plant: &BoxPlant, combination: &[usize]) -> f64 {
-        let chosen = |i: usize| plant.options()[i][combination[i]];
+        let chosen = |i: usize| plant.options[i][combination[i]];
         let term = |i: usize| {
             let gain = Complex::from(1.0 + chosen(i).gain);
             let of = |(column, row): (usize, usize)| (self.filters[column] * self.samples[row] * gain).re;

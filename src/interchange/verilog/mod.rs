@@ -212,7 +212,7 @@ fn arithmetic(model: &BitTrue, words: WordSizes, needed: u32) -> String {
     format!(
         "A tap is its integer times 2^{}, and a step of an output is one of a sample.{offsets}\n   \
          {sums}.\n   Each sum is rounded to the nearest step, halves upwards, and saturates",
-        -model.fraction_bits(),
+        -model.fraction_bits,
     )
 }
 

@@ -4,9 +4,7 @@
 use super::prepare::Reduced;
 use crate::linalg::blocks::Batch;
 use crate::linalg::{self, LinalgError, Mat, Svd};
-
-/// Singular values below this, relative to the largest, count as zero.
-const INJECTIVE: f64 = 1e-12;
+use crate::lmi::settings::SETTINGS;
 
 /// The map from one row's taps to that row of `F(omega_l) h_l`, as a QR factorisation that serves all
 /// numbers of lags (columns are ordered by lag), with an SVD of each triangle in use.
@@ -49,7 +47,9 @@ impl Basis {
         let longest = self.triangles.iter().max_by_key(|(lags, _)| *lags).map(|(_, svd)| svd);
         let Some(svd) = longest else { return 0.0 };
         match (svd.s.first(), svd.s.last()) {
-            (Some(most), Some(least)) if svd.s.len() == svd.v.nrows() && *least > INJECTIVE * most => {
+            (Some(most), Some(least))
+                if svd.s.len() == svd.v.nrows() && *least > SETTINGS.injective * most =>
+            {
                 1.0 / least
             }
             _ => f64::INFINITY,

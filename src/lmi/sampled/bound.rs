@@ -15,16 +15,11 @@ use super::prepare::Reduced;
 use super::problem::{FrequencyPoint, SampledProblem};
 use crate::linalg::blocks::Batch;
 use crate::linalg::{self, CMat, Complex, LinalgError, Mat};
+use crate::lmi::settings::SETTINGS;
 use crate::lti::FirMatrix;
 
 /// Thresholds tried between weak directions of tap space and rounding errors; the best bound counts.
 const CUTS: [f64; 3] = [1e-14, 1e-12, 1e-9];
-/// Where the data do not confine the taps: up to this many times the size of the solution (or of unit
-/// gain) they are covered by the bound.
-const RADIUS_FACTOR: f64 = 1e3;
-/// An estimate of the rounding errors of a sum beside its length, in units of the machine precision:
-/// products, phases, singular values. It keeps bounds of rounding errors alone from being taken for bounds.
-const ROUNDING_PER_OPERATION: f64 = 16.0;
 
 /// A lower bound, computed in doubles and not proven.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +50,7 @@ pub(crate) fn lower_bound(problem: &SampledProblem, dual: &[CMat], radius: f64) 
     let pairs = || dual.iter().zip(problem.points());
     let value: f64 = pairs().map(|(y, point)| y.dotc(&point.w).re).sum();
     let moduli: f64 = pairs().map(|(y, point)| y.norm() * point.w.norm()).sum();
-    let depth = ROUNDING_PER_OPERATION + (problem.rows() * problem.inputs() + dual.len()) as f64;
+    let depth = SETTINGS.rounding_per_operation + (problem.rows() * problem.inputs() + dual.len()) as f64;
     let charged = value - residual_norm(problem, dual) * radius - depth * f64::EPSILON * moduli;
     let bound = charged / nuclear;
     Ok(if bound.is_finite() { bound.max(0.0) } else { 0.0 })
@@ -79,7 +74,7 @@ fn residual_norm(problem: &SampledProblem, dual: &[CMat]) -> f64 {
     }
     let moduli: f64 = dual.iter().zip(&scaled).map(|(y, h)| y.norm() * h.norm()).sum();
     let angle = problem.points().iter().map(|p| p.omega.abs()).fold(0.0, f64::max) * lags as f64;
-    let depth = ROUNDING_PER_OPERATION + (problem.inputs() + products.len()) as f64 + angle;
+    let depth = SETTINGS.rounding_per_operation + (problem.inputs() + products.len()) as f64 + angle;
     square.sqrt() + depth * f64::EPSILON * moduli * (lags as f64).sqrt()
 }
 
@@ -107,7 +102,7 @@ pub(super) fn cover(
     (taps, gamma): (&FirMatrix, f64),
 ) -> Result<Coverage, LinalgError> {
     let reference = problem.points().iter().map(|p| p.w.norm()).fold(0.0, f64::max);
-    let stated = RADIUS_FACTOR * size(problem, taps).max(reference);
+    let stated = SETTINGS.radius_factor * size(problem, taps).max(reference);
     let spread = (problem.rows() as f64).sqrt() * gamma;
     let image = problem.points().iter().map(|p| (p.w.norm() + spread).powi(2)).sum::<f64>().sqrt();
     let confined = image * basis.inverse_norm() * mix_norm(problem, reduced)?;

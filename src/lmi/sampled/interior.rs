@@ -13,6 +13,7 @@ use crate::linalg::blocks::Batch;
 use crate::lmi::IsDue;
 use crate::lmi::factor::RegularisedCholesky;
 use crate::lmi::iteration::{self, StepLengths, centering};
+use crate::lmi::settings::SETTINGS;
 
 /// The objective.
 #[derive(Debug, Clone)]
@@ -22,10 +23,6 @@ pub(super) enum Objective {
     /// A quadratic function of the taps, with t fixed.
     MeanSquare(Quadratic),
 }
-
-/// Start of the mean-square iteration: its gap relative to the objective. Near enough to the end, far enough
-/// from the boundary.
-const STARTING_GAP: f64 = 0.1;
 
 /// The iterate.
 pub(super) struct InteriorIterate<'a> {
@@ -60,7 +57,7 @@ impl<'a> InteriorIterate<'a> {
         let (curvature, start) = match &objective {
             Objective::WorstCase => (None, None),
             Objective::MeanSquare(quadratic) => {
-                let gap = STARTING_GAP * quadratic.value(&cone.k, &x).max(f64::MIN_POSITIVE);
+                let gap = SETTINGS.starting_gap * quadratic.value(&cone.k, &x).max(f64::MIN_POSITIVE);
                 (Some(quadratic.curvature(reduced)), Some(gap / cone.order() as f64))
             }
         };

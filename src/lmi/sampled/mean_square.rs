@@ -12,7 +12,8 @@ use super::quadratic::Quadratic;
 use crate::linalg::LinalgError;
 use crate::lmi::IsDue;
 use crate::lmi::factor::RegularisedCholesky;
-use crate::lmi::iteration::{self, Iterate, RANK_TOLERANCE};
+use crate::lmi::iteration::{self, Iterate};
+use crate::lmi::settings::SETTINGS;
 use crate::lti::FirMatrix;
 
 /// Taps of least mean square under a cap.
@@ -29,10 +30,6 @@ pub struct CappedMeanSquare {
     /// Number of steps.
     pub iterations: usize,
 }
-
-/// The share of the way to the cap that taps go which must not end beyond it: the rest is far more than the
-/// rounding of a gain, and costs a thousandth of the improvement.
-const WAY_TO_CAP: f64 = 0.999;
 
 /// Taps that minimise the secondary objective, by a QR factorisation (never by normal equations); least norm
 /// among directions weaker than `tol_rank` times the strongest.
@@ -65,7 +62,7 @@ pub fn mean_square_under_cap(
     tol_gap_rel: f64,
     is_due: IsDue<'_>,
 ) -> Result<Option<CappedMeanSquare>, LinalgError> {
-    let free = least_squares(problem, square, RANK_TOLERANCE)?;
+    let free = least_squares(problem, square, SETTINGS.rank_tolerance)?;
     let free_square = problem.mean_square(&free, square);
     let mut best = BestCapped::new(problem, square, cap, start)?;
     best.offer(free)?;
@@ -142,7 +139,7 @@ impl<'a> BestCapped<'a> {
         if gamma <= self.cap || self.gamma >= self.cap {
             return Ok(taps);
         }
-        let share = WAY_TO_CAP * (self.cap - self.gamma) / (gamma - self.gamma);
+        let share = SETTINGS.way_to_cap * (self.cap - self.gamma) / (gamma - self.gamma);
         Ok(self.taps.lags().iter().zip(taps.lags()).map(|(own, taps)| own + (taps - own) * share).collect())
     }
 

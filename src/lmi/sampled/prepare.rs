@@ -5,11 +5,8 @@ use super::fourier::{LagPhasors, Layout};
 use super::problem::SampledProblem;
 use crate::linalg::blocks::Batch;
 use crate::linalg::{self, CMat, LinalgError, Mat};
+use crate::lmi::settings::SETTINGS;
 use crate::lti::FirMatrix;
-
-/// Singular values of the row-normalised channels below this are rounding errors; their directions are
-/// dropped.
-const CHANNEL_RANK: f64 = 1e-14;
 
 /// The problem in well-conditioned coordinates.
 #[derive(Debug, Clone)]
@@ -126,7 +123,7 @@ fn mixing(channels: &Batch) -> Result<Mat, LinalgError> {
     let unit: Vec<f64> = strength.iter().map(|s| if *s > 0.0 { 1.0 / s } else { 0.0 }).collect();
     all.row_iter_mut().zip(&unit).for_each(|(mut row, unit)| row *= *unit);
     let svd = linalg::svd(&linalg::lq_factor(&all))?;
-    let rank = svd.rank(CHANNEL_RANK);
+    let rank = svd.rank(SETTINGS.channel_rank);
     let power = (count as f64).sqrt();
     Ok(Mat::from_fn(rank, n, |r, i| power / svd.s[r] * svd.u[(i, r)] * unit[i]))
 }

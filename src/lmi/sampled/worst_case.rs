@@ -7,12 +7,9 @@ use super::prepare::Reduced;
 use super::problem::SampledProblem;
 use crate::linalg::LinalgError;
 use crate::lmi::IsDue;
-use crate::lmi::iteration::{self, GAP_OF_ZERO, Iterate, RANK_TOLERANCE};
+use crate::lmi::iteration::{self, Iterate};
+use crate::lmi::settings::SETTINGS;
 use crate::lti::FirMatrix;
-
-/// The start lies this factor above the worst point of the least-squares taps (in t), far enough inside for
-/// the first Newton step.
-const START_MARGIN: f64 = 2.0;
 
 /// Taps of least worst-case norm with the interval that the optimum lies in.
 #[derive(Debug, Clone)]
@@ -47,7 +44,7 @@ pub fn minimise(
         return fixed(problem);
     }
     let basis = Basis::new(&reduced, vec![1.0; reduced.count()], &[])?;
-    let x = basis.least_squares(&reduced, &reduced.w, RANK_TOLERANCE);
+    let x = basis.least_squares(&reduced, &reduced.w, SETTINGS.rank_tolerance);
     let best = LeastGamma::new(problem, reduced.taps(&x))?;
     if best.relative_gap() <= tol_gap_rel {
         return Ok(best.finish(true, 0));
@@ -57,7 +54,8 @@ pub fn minimise(
     reduced.w = reduced.error(&x);
     reduced.rescale(scale);
     let zero = vec![0.0; x.len()];
-    let Some(engine) = InteriorIterate::new(&reduced, Objective::WorstCase, zero, START_MARGIN, is_due)
+    let Some(engine) =
+        InteriorIterate::new(&reduced, Objective::WorstCase, zero, SETTINGS.start_margin, is_due)
     else {
         return Ok(best.finish(false, 0));
     };
@@ -89,7 +87,7 @@ struct LeastGamma {
 impl LeastGamma {
     fn new(problem: &SampledProblem, taps: FirMatrix) -> Result<Self, LinalgError> {
         let gamma = problem.worst(&taps)?;
-        let floor = GAP_OF_ZERO * problem.worst(&problem.zero_taps())?;
+        let floor = SETTINGS.gap_of_zero * problem.worst(&problem.zero_taps())?;
         Ok(Self { floor, taps, gamma, lower: LowerBound { value: 0.0, covers_all: true } })
     }
 

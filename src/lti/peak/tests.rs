@@ -115,7 +115,7 @@ fn refinement_reaches_the_peak_whatever_the_first_points() {
         };
         let search = PeakSearch::new(&empty, 0, &response, Vec::new());
         let look = |x: f64| search.at(middle + x * width).unwrap();
-        let top = refine(|w| search.at(w), [look(-1.0), look(0.0), look(1.0)], FLAT_GAIN).unwrap();
+        let top = refine(|w| search.at(w), [look(-1.0), look(0.0), look(1.0)], SETTINGS.flat_gain).unwrap();
         let exact = gain(slope / (1.0 + (1.0 + 3.0 * skew * slope).sqrt()));
         assert!((top.gain - exact).abs() < 1e-11, "{seed}: {top:?} {exact}");
         assert!(evaluations.get() <= 20, "{seed}: {} evaluations", evaluations.get());
@@ -142,7 +142,7 @@ fn accuracy_is_relative_to_the_peak_whatever_the_units() {
         gains.push(hinf_norm(&system).unwrap().gain / (input * output));
     }
     for gain in &gains {
-        assert!((gain / exact - 1.0).abs() < PEAK_ACCURACY, "{gain} {exact}");
-        assert!((gain / gains[0] - 1.0).abs() < 10.0 * FLAT_GAIN, "{gains:?}");
+        assert!((gain / exact - 1.0).abs() < SETTINGS.accuracy, "{gain} {exact}");
+        assert!((gain / gains[0] - 1.0).abs() < 10.0 * SETTINGS.flat_gain, "{gains:?}");
     }
 }

@@ -115,20 +115,6 @@ fn empty_recordings_give_an_empty_one_with_a_warning() {
     refused(&desk, &strict, &["empty.wav", "length is zero", "--strict"]);
 }
 
-#[test]
-fn a_truncated_file_gives_what_is_whole() {
-    let desk = Desk::new();
-    let (a, b) = ramps(100);
-    wav::write_pair(&desk, &a, &b);
-    let bytes = desk.read("a.wav");
-    desk.write("a.wav", &bytes[..bytes.len() - 41]);
-    let output = desk.run(&["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--keep-latency"], &[]);
-    assert!(output.status.success());
-    let stderr = text(&output.stderr);
-    assert!(stderr.contains("41 bytes") && stderr.contains("3 bytes of it"), "{stderr}");
-    assert_eq!(wav::samples(&desk, "out.wav"), fused(&interleaved(&a[..89], &b[..89])));
-}
-
 /// What follows the samples in a second data chunk is left out, and said to be.
 #[test]
 fn a_second_data_chunk_is_not_lost_in_silence() {
@@ -144,27 +130,4 @@ fn a_second_data_chunk_is_not_lost_in_silence() {
     assert!(output.status.success() && stderr.contains("a.wav: 400 bytes of samples follow"), "{stderr}");
     assert_eq!(wav::samples(&desk, "out.wav"), fused(&interleaved(&a, &b)));
     refused(&desk, &[&fuse[..], &["--strict", "--force"]].concat(), &["a.wav", "one data chunk", "--strict"]);
-}
-
-/// Files of other kinds have the way by which they can be read.
-#[test]
-fn recordings_that_are_not_read_are_named() {
-    let desk = Desk::new();
-    wav::write_pair(&desk, &[0.0; 9], &[0.0; 9]);
-    let swapped = [b"RIFX", &desk.read("a.wav")[4..]].concat();
-    for (bytes, words) in [
-        (swapped, ["big-endian", "write it as RIFF"]),
-        (b"PK\x03\x04x.npy".to_vec(), ["npz", "numpy.save"]),
-        (b"OggSvorbis".to_vec(), ["Ogg", "convert it"]),
-        (b"fLaC\0\0\0\x22".to_vec(), ["FLAC", "rename it"]),
-        (b"\x89PNG\r\n".to_vec(), ["a picture", "give a recording"]),
-        (b"XXXX....WAVEfmt ".to_vec(), ["not a WAV file", "XXXX"]),
-    ] {
-        desk.write("c.wav", bytes);
-        refused(
-            &desk,
-            &["fuse", "bank.json", "a.wav", "c.wav", "-o", "no.wav"],
-            &["c.wav", words[0], words[1]],
-        );
-    }
 }

@@ -34,8 +34,8 @@ const AROUND: [[f64; 2]; 5] = [[0.0, 0.0], [4.0, 0.0], [-4.0, 0.0], [0.0, 4.0], 
 const SIGMA_SHARE: f64 = 0.2;
 
 /// What a photograph counts where another surface hides the point. The meshes err most where surfaces meet:
-/// without these photographs the pairs of `tests/morph` lose up to 0.4 dB, and where tracks follow the
-/// outlines, as in `tests/two_planes.rs`, a fifth is nearly as good as nothing.
+/// without these photographs the pairs of `tests/views/morph` lose up to 0.4 dB, and where tracks follow the
+/// outlines a fifth is nearly as good as nothing.
 const HIDDEN_WEIGHT: f32 = 0.2;
 
 /// Renders the virtual view of `size` from the surfaces of that view and of each photograph. If `leaves`,

@@ -1,4 +1,4 @@
-//! COLMAP models on the command line: binary ones with their own depth maps, and what users get wrong.
+//! COLMAP models on the command line: photographs of another size than that of their cameras.
 
 use super::*;
 use hybank_ibr::camera::colmap::parse_model;
@@ -53,72 +53,7 @@ fn psnr(dir: &Path, arguments: &[&str]) -> f64 {
     json(&run(dir, &[&common[..], arguments].concat()))["psnr"].as_f64().unwrap()
 }
 
-fn replace(dir: &Path, from: &str, to: &str) {
-    let scene = std::fs::read_to_string(dir.join("s.toml")).unwrap();
-    assert!(scene.contains(from), "{scene}");
-    std::fs::write(dir.join("s.toml"), scene.replace(from, to)).unwrap();
-}
-
 const FLAT: [&str; 3] = ["a.png", "b.png", "c.png"];
-
-/// A binary model and the `.geometric.bin` maps of its dense reconstruction, where unknown depths are 0: the
-/// view is that of the text model with the same depths.
-#[test]
-fn binary_models_and_their_depth_maps_are_rendered() {
-    let dir = folder(FLAT);
-    let at = |name: &str| dir.path().join(name);
-    let truth = ["--view", "photos/c.png", "--truth", "photos/c.png"];
-    let want = psnr(dir.path(), &truth);
-    let picture = std::fs::read(at("o.png")).unwrap();
-    let workspace = at("dense/stereo/depth_maps");
-    std::fs::create_dir_all(&workspace).unwrap();
-    std::fs::create_dir(at("dense/sparse")).unwrap();
-    let put = |bytes: &mut Vec<u8>, values: &[f64]| values.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
-    let mut inner = 1_u64.to_le_bytes().to_vec();
-    inner.extend(1_u32.to_le_bytes());
-    inner.extend(1_i32.to_le_bytes());
-    [SIZE.0 as u64, SIZE.1 as u64].iter().for_each(|side| inner.extend(side.to_le_bytes()));
-    put(&mut inner, &INNER);
-    let mut poses = 3_u64.to_le_bytes().to_vec();
-    for (k, name) in FLAT.iter().enumerate() {
-        poses.extend((k as u32).to_le_bytes());
-        put(&mut poses, &[1.0, 0.0, 0.0, 0.0, -PLACES[k], 0.0, 0.0]);
-        poses.extend(1_u32.to_le_bytes());
-        poses.extend(format!("{name}\0").as_bytes());
-        poses.extend(1_u64.to_le_bytes());
-        put(&mut poses, &[7.0, 8.0]);
-        poses.extend((-1_i64).to_le_bytes());
-        let map = pfm::decode(&std::fs::read(at(&format!("{k}.pfm"))).unwrap()).unwrap();
-        let mut bytes = format!("{}&{}&1&", map.width(), map.height()).into_bytes();
-        map.data().iter().for_each(|depth| bytes.extend(depth.to_le_bytes()));
-        std::fs::write(workspace.join(format!("{name}.geometric.bin")), bytes).unwrap();
-        replace(dir.path(), &format!("{k}.pfm"), &format!("dense/stereo/depth_maps/{name}.geometric.bin"));
-    }
-    std::fs::write(at("dense/sparse/cameras.bin"), inner).unwrap();
-    std::fs::write(at("dense/sparse/images.bin"), poses).unwrap();
-    replace(dir.path(), "\"model\"", "\"dense/sparse\"");
-    assert!(want > 31.0 && (psnr(dir.path(), &truth) - want).abs() < 1e-9, "{want}");
-    assert!(std::fs::read(at("o.png")).unwrap() == picture);
-    // Depths that the reconstruction does not know are 0: here 1000 in the upper rows. They take the
-    // farthest depths around them, and the other view decides.
-    let hole = 500..1500;
-    let path = workspace.join("a.png.geometric.bin");
-    let mut bytes = std::fs::read(&path).unwrap();
-    let header = bytes.len() - 4 * SIZE.0 * SIZE.1;
-    bytes[header + 4 * hole.start..header + 4 * hole.end].fill(0);
-    std::fs::write(&path, bytes).unwrap();
-    let done = run(dir.path(), &["render", "s.toml", "--view", "c.png", "-o", "p.png", "--json"]);
-    assert_eq!(json(&done)["filled_depths"], hole.len());
-    let filled = psnr(dir.path(), &truth);
-    assert!(filled > want - 0.5, "{filled} {want}");
-    std::fs::write(at("dense/sparse/images.bin"), [1; 9]).unwrap();
-    refused(
-        dir.path(),
-        &["render", "s.toml", "--view", "c.png", "-o", "q.png"],
-        1,
-        &["images.bin", "record"],
-    );
-}
 
 /// Photographs of half the size that the model is for: the cameras are scaled with them.
 #[test]

@@ -1,4 +1,4 @@
-//! Runs that are disturbed: interrupted, without threads, with outputs that are inputs.
+//! Runs that are disturbed: interrupted, or with outputs that are inputs.
 
 use super::*;
 
@@ -51,22 +51,6 @@ fn no_file_of_the_scene_is_replaced_even_by_force() {
     }
     assert_eq!(["left.png", "right.png", "left.pfm", "middle.png"].map(read), before);
     assert!(!dir.path().join("new.png").exists());
-}
-
-#[cfg(unix)]
-fn shell(dir: &Path, script: &str) -> Output {
-    Command::new("sh").current_dir(dir).env("H", PROGRAM).args(["-c", script]).output().unwrap()
-}
-
-#[cfg(target_os = "linux")]
-#[test]
-fn without_threads_the_work_is_refused_in_one_line() {
-    let dir = rig();
-    // More than any address space: no thread with such a stack can be started.
-    let line = "RUST_MIN_STACK=1000000000000000 $H render scene.toml -o more.png --threads 3";
-    let refused = shell(dir.path(), line);
-    assert_eq!((code(&refused), stderr(&refused).lines().count()), (1, 1), "{}", stderr(&refused));
-    assert!(stderr(&refused).contains("--threads 3"), "{}", stderr(&refused));
 }
 
 #[cfg(target_os = "linux")]

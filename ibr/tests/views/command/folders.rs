@@ -112,18 +112,6 @@ fn no_file_of_a_model_is_replaced() {
     }
 }
 
-/// Photographs of different sizes are no rectified rig.
-#[test]
-fn a_pair_of_two_sizes_is_refused() {
-    let dir = photographs(&[("left.png", "a.png"), ("right.png", "b.png")]);
-    save(&Image::filled(30, 20, 3, 9.0), &dir.path().join("set/b.png")).unwrap();
-    for inputs in [&["set"][..], &["set/a.png", "set/b.png"]] {
-        let arguments = [&["init"], inputs, &["-o", "s.toml"]].concat();
-        refused(dir.path(), &arguments, 1, &["set/a.png", "120 x 90", "set/b.png", "30 x 20"]);
-    }
-    assert!(!dir.path().join("s.toml").exists());
-}
-
 #[test]
 fn transforms_are_a_scene() {
     let dir = workspace();
@@ -139,26 +127,6 @@ fn transforms_are_a_scene() {
     let scene = is_rendered(dir.path(), &["set"], 27.0);
     assert!(scene.contains("transforms = \"set/transforms.json\""), "{scene}");
     assert_eq!(is_rendered(dir.path(), &["set/transforms.json"], 27.0), scene);
-}
-
-#[test]
-fn what_is_no_scene_is_refused() {
-    let dir = photographs(&[("left.png", "a.png"), ("right.png", "b.png"), ("middle.png", "c.png")]);
-    let init = |inputs: &[&'static str]| [&["init"], inputs, &["-o", "s.toml"]].concat();
-    refused(dir.path(), &init(&["set"]), 1, &["set", "3 photographs", "by their names"]);
-    refused(dir.path(), &init(&["nowhere"]), 1, &["nowhere", "no such file or folder"]);
-    refused(dir.path(), &init(&["set/a.png"]), 1, &["set/a.png", "no scene"]);
-    refused(dir.path(), &["render", "set", "-o", "o.png"], 1, &["set", "3 photographs"]);
-    std::fs::write(dir.path().join("s.toml"), "").unwrap();
-    refused(dir.path(), &init(&["set/a.png", "set/b.png"]), 1, &["s.toml exists", "--force"]);
-    let rig =
-        "[[view]]\nimage = \"set/a.png\"\nposition = 0\ndisparity = \"points\"\n[virtual]\nposition = 0.5\n";
-    std::fs::write(dir.path().join("s.toml"), rig).unwrap();
-    refused(dir.path(), &["render", "s.toml", "-o", "o.png"], 1, &["\"points\"", "rectified"]);
-    std::fs::write(dir.path().join("s.toml"), rig.replace("\"points\"", "\"matched\"\nstep = 2")).unwrap();
-    refused(dir.path(), &["render", "s.toml", "-o", "o.png"], 1, &["`step`", "no file"]);
-    std::fs::write(dir.path().join("s.toml"), rig.replace("points", "matched")).unwrap();
-    refused(dir.path(), &["render", "s.toml", "-o", "o.png"], 1, &["photograph 1", "no other one"]);
 }
 
 #[test]

@@ -60,32 +60,6 @@ fn transforms() -> tempfile::TempDir {
     dir
 }
 
-/// One line says the scale of all depth maps, and keys in a wrong table are sent to theirs.
-#[test]
-fn the_scale_of_all_maps_is_one_line() {
-    let dir = transforms();
-    let top = "transforms = \"transforms.json\"\n";
-    let psnr = |scene: &str| {
-        write(dir.path(), "s.toml", scene);
-        let arguments = ["render", "s.toml", "-o", "o.png", "--force", "--truth", "2.png", "--json"];
-        json(&run(dir.path(), &arguments))["psnr"].as_f64().unwrap()
-    };
-    let target = "[virtual]\ncamera_of = \"2.png\"\n";
-    let scaled = psnr(&format!("{top}depth_scale = 100.0\n{target}"));
-    let view = |k: usize| format!("[[view]]\nimage = \"{k}.png\"\ndepth = \"d{k}.png\"\n");
-    let tables = view(0) + &view(1);
-    let listed = psnr(&format!("{top}depth_scale = 100.0\n{tables}{target}"));
-    let own = psnr(&format!("{top}{}{target}", tables.replace("depth =", "depth_scale = 100.0\ndepth =")));
-    assert!(scaled > 30.0 && scaled == listed && scaled == own, "{scaled} {listed} {own}");
-    write(dir.path(), "s.toml", &format!("{top}step = 2\n{target}"));
-    refused(
-        dir.path(),
-        &["render", "s.toml", "-o", "x.png"],
-        1,
-        &["s.toml:2:1: ", "`step` belongs in [[view]]"],
-    );
-}
-
 /// Without `[virtual]` the message names the key to write; a frame without depth is a place too.
 #[test]
 fn transforms_without_a_virtual_view_say_which_key_is_missing() {

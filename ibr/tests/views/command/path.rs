@@ -93,24 +93,3 @@ fn a_path_does_not_pulse_from_frame_to_frame() {
         }
     }
 }
-
-/// What the test above would see of a view that enters at once: beside the place at which the second
-/// nearest view changes, the frames of the two pairs.
-#[test]
-fn a_view_that_enters_at_once_would_show() {
-    let dir = scenes();
-    let whole = std::fs::read_to_string(dir.path().join("rig.toml")).unwrap();
-    let tables: Vec<&str> = whole.split("[[view]]").collect();
-    let frame = |pair: [usize; 2], at: f64| {
-        let views = pair.map(|k| format!("[[view]]{}", tables[k + 1]));
-        let text = format!("{}{}[virtual]\nposition = {at:?}\n", views[0], views[1]);
-        std::fs::write(dir.path().join("pair.toml"), text).unwrap();
-        good(dir.path(), &["render", "pair.toml", "-o", "pair.pfm", "--force", "--keep-exposure"]);
-        pixels(&dir.path().join("pair.pfm"))
-    };
-    let (before, after) = (0.5375, 0.5625);
-    let truth = [before, after].map(|at| shot(at).0.data().to_vec());
-    let frames = [frame([0, 1], before), frame([1, 2], after)];
-    let (step, change) = largest_steps(&frames, &truth, "at once");
-    assert!(step > 4.0 && change > 5.5, "{step} {change}");
-}

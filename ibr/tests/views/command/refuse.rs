@@ -1,59 +1,6 @@
-//! Invalid scenes, arguments and usage: one clear message each.
+//! Invalid arguments and usage: one clear message each.
 
 use super::*;
-use hybank_ibr::image::Image;
-
-/// Contradictions, numbers out of range and files that are no files: exit code 1 and one message with the
-/// words.
-#[test]
-fn hostile_scenes_are_refused_by_name() {
-    let dir = rig();
-    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
-    let map = |name: &str, value: f32| {
-        let data = vec![value; 120 * 90];
-        let bytes = pfm::encode(&Image::new(120, 90, 1, data).unwrap());
-        std::fs::write(dir.path().join(name), bytes).unwrap();
-    };
-    map("tiny.pfm", 1e-42);
-    map("negative.pfm", -3.0);
-    std::fs::write(dir.path().join("huge.pfm"), "Pf\n100000 100000\n-1\n").unwrap();
-    std::fs::write(dir.path().join("huge.pgm"), "P5 100000 100000 255\n").unwrap();
-    std::fs::write(dir.path().join("empty.png"), "").unwrap();
-    let whole = std::fs::read(dir.path().join("left.png")).unwrap();
-    std::fs::write(dir.path().join("cut.png"), &whole[..whole.len() / 2]).unwrap();
-    for (from, to, words) in [
-        ("left.pfm\"", "tiny.pfm\"", &["tiny.pfm", "none of the 10800"][..]),
-        ("left.pfm\"", "negative.pfm\"", &["negative.pfm", "none of the 10800"]),
-        ("left.pfm\"", "huge.pfm\"", &["huge.pfm", "100000 x 100000"]),
-        ("left.pfm\"", "left.png\"", &["left.png", "different red, green and blue"]),
-        ("left.png\"", "huge.pgm\"", &["huge.pgm"]),
-        ("left.png\"", "empty.png\"", &["empty.png"]),
-        ("left.png\"", "cut.png\"", &["cut.png"]),
-        ("left.png\"", ".\"", &["it is a folder"]),
-        ("left.pfm\"", "left.pfm\"\ndisparity_scale = 0.0", &["\"left\"", "the scale is 0"]),
-        ("left.pfm\"", "left.pfm\"\ndisparity_scale = -2.0", &["\"left\"", "the scale is -2"]),
-        ("left.pfm\"", "left.pfm\"\ndisparity_scale = nan", &["\"left\"", "the scale is NaN"]),
-        ("left.pfm\"", "left.pfm\"\ndisparity_scale = inf", &["\"left\"", "the scale is inf"]),
-        ("left.pfm\"", "left.pfm\"\nstep = 1000", &["\"left\"", "1 x 1"]),
-        ("left.pfm\"", "left.pfm\"\nstep = 0", &["\"left\"", "at least 1"]),
-        ("left.pfm\"", "left.pfm\"\nstep = -1", &["-1", "broken.toml:"]),
-        ("left.pfm\"", "left.pfm\"\ndepth = \"left.pfm\"", &["\"left\"", "`depth`"]),
-        ("position = 1.0", "position = nan", &["\"right\"", "position = NaN"]),
-        ("position = 0.5", "position = inf", &["virtual view", "position = inf"]),
-        ("position = 0.5", "position = 1e300", &["broken.toml", "of 21600 pixels"]),
-        ("\"right\"", "\"left\"", &["two views are named \"left\""]),
-        ("disparity =", "disparty =", &["did you mean `disparity`?"]),
-    ] {
-        std::fs::write(dir.path().join("broken.toml"), scene.replacen(from, to, 1)).unwrap();
-        let refused = run(dir.path(), &["render", "broken.toml", "-o", "o.png"]);
-        let message = stderr(&refused);
-        assert_eq!(code(&refused), 1, "{to}: {message}");
-        assert!(words.iter().all(|w| message.contains(w)), "{to}: {message}");
-        assert!(
-            !message.contains("panicked") && refused.stdout.is_empty() && !dir.path().join("o.png").exists()
-        );
-    }
-}
 
 /// Settings that make no sense, and outputs that cannot be: one message each, with the right exit code.
 #[test]

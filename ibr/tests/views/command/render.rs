@@ -134,34 +134,6 @@ fn depth_and_sixteen_bits_are_written() {
     assert!(code(&refused) == 2 && stderr(&refused).contains(".png files only"), "{}", stderr(&refused));
 }
 
-/// The views of a path are those that are rendered one by one, in numbered files.
-#[test]
-fn a_path_gives_numbered_views() {
-    let dir = rig();
-    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).unwrap();
-    std::fs::write(dir.path().join("path.toml"), scene.clone() + "to_position = 1.0\nframes = 3\n").unwrap();
-    let done = run(dir.path(), &["render", "path.toml", "-o", "film.png", "--depth", "d.pfm", "--json"]);
-    assert_eq!(json(&done)["frames"].as_array().unwrap().len(), 3);
-    let bytes = |name: &str| std::fs::read(dir.path().join(name)).unwrap();
-    for (k, position) in [(1, "0.5"), (2, "0.75"), (3, "1.0")] {
-        let one = scene.replace("position = 0.5", &format!("position = {position}"));
-        std::fs::write(dir.path().join("one.toml"), one).unwrap();
-        let done = run(dir.path(), &["render", "one.toml", "-o", "one.png", "--depth", "one.pfm", "--force"]);
-        assert_eq!(code(&done), 0, "{}", stderr(&done));
-        assert!(bytes("one.png") == bytes(&format!("film-000{k}.png")), "view {k}");
-        assert!(bytes("one.pfm") == bytes(&format!("d-000{k}.pfm")), "depth {k}");
-    }
-    let again = run(dir.path(), &["render", "path.toml", "-o", "film.png"]);
-    assert!(code(&again) == 1 && stderr(&again).contains("film-0001.png exists"), "{}", stderr(&again));
-    let refused = run(dir.path(), &["render", "path.toml", "-o", "x.png", "--truth", "middle.png"]);
-    assert_eq!(code(&refused), 2, "{}", stderr(&refused));
-    // A view that would replace an input is refused before anything is rendered.
-    let taken = scene.replace("left.png", "film-0002.png") + "to_position = 1.0\nframes = 3\n";
-    std::fs::write(dir.path().join("taken.toml"), taken).unwrap();
-    let refused = run(dir.path(), &["render", "taken.toml", "-o", "film.png", "--force"]);
-    assert!(code(&refused) == 1 && stderr(&refused).contains("film-0002.png"), "{}", stderr(&refused));
-}
-
 #[test]
 fn files_are_not_overwritten_and_appear_whole() {
     let dir = rig();
@@ -336,75 +308,4 @@ fn images_and_tracks_alone_are_enough() {
     assert_eq!(code(&refused), 1);
     assert!(stderr(&refused).contains("planar"), "{}", stderr(&refused));
     assert!(!dir.path().join("q.png").exists());
-}
-
-#[test]
-fn odd_images_are_fine() {
-    let dir = tempfile::tempdir().unwrap();
-    let write = |name: &str, bytes: &[u8]| std::fs::write(dir.path().join(name), bytes).unwrap();
-    write("grey.pgm", b"P5 2 1 255\n\x10\x20");
-    write("deep.pgm", b"P5 2 1 65535\n\x10\x10\x20\x20");
-    write("colour.ppm", b"P6 2 1 255\n\x10\x10\x10\x20\x20\x20");
-    save(&Image::new(2, 1, 3, vec![16.0, 16.0, 16.0, 32.0, 32.0, 32.0]).unwrap(), &dir.path().join("c.jpg"))
-        .unwrap();
-    write("little.pfm", b"Pf 2 1 -1\n\0\0\x80\x3f\0\0\x80\x3f");
-    write("big.pfm", b"Pf 2 1 1\n\x3f\x80\0\0\x3f\x80\0\0");
-    write("one.pgm", b"P5 1 1 255\n\x40");
-    write("flat.pgm", b"P5 2 1 255\n\x01\x01");
-    let view = |name: usize, image: &str, map: &str| {
-        format!("[[view]]\nname = \"{name}\"\nimage = \"{image}\"\nposition = 0.0\ndisparity = \"{map}\"\n")
-    };
-    for (a, b, maps) in [
-        ("grey.pgm", "colour.ppm", ["little.pfm", "big.pfm"]),
-        ("deep.pgm", "c.jpg", ["big.pfm", "flat.pgm"]),
-        ("one.pgm", "one.pgm", ["one.pgm", "one.pgm"]),
-    ] {
-        let text = view(1, a, maps[0]) + &view(2, b, maps[1]) + "[virtual]\nposition = 0.0\n";
-        write("s.toml", text.as_bytes());
-        let figures = json(&run(dir.path(), &["render", "s.toml", "-o", "o.png", "--force", "--json"]));
-        assert_eq!(figures["coverage"], 1.0, "{a} {b}: {figures}");
-        let image = read_image(&dir.path().join("o.png"), MOST_PIXELS).unwrap();
-        let first = image.data()[0];
-        // The fit smooths the step of 16 grey levels between two pixels by two of them if both views count.
-        // All maps say a disparity of one: a view with nearer samples would hide the other, and one sample
-        // per pixel is smoothed by three.
-        assert!((first - if a == "one.pgm" { 64.0 } else { 16.0 }).abs() <= 2.0, "{a} {b}: {first}");
-    }
-}
-
-/// A COLMAP model whose lenses bend: the photograph of the view that is left out is met through its own
-/// lens.
-#[test]
-fn colmap_lenses_are_used() {
-    let dir = tempfile::tempdir().unwrap();
-    let scene = SyntheticScene::default();
-    let mut images = String::new();
-    let mut toml = "colmap = \"model\"\n".to_string();
-    std::fs::create_dir(dir.path().join("model")).unwrap();
-    let (focal, cx, cy) = (108.0, 60.0, 45.0);
-    let write_cameras = |bend: &str| {
-        let line = format!("1 OPENCV 120 90 {focal} {focal} {cx} {cy} {bend}\n");
-        std::fs::write(dir.path().join("model/cameras.txt"), line).unwrap();
-    };
-    write_cameras("-0.25 0.08 0.004 -0.003");
-    for (k, x) in [-0.2, 0.2, 0.0].into_iter().enumerate() {
-        images += &format!("{k} 1 0 0 0 {} 0 0 1 {k}.png\n\n", -x);
-        toml += &format!("[[view]]\nname = \"{k}\"\nimage = \"{k}.png\"\ndepth = \"{k}.pfm\"\n");
-    }
-    std::fs::write(dir.path().join("model/images.txt"), images).unwrap();
-    std::fs::write(dir.path().join("s.toml"), toml).unwrap();
-    let model = hybank_ibr::camera::colmap::read_model(&dir.path().join("model")).unwrap();
-    for k in 0..3 {
-        let camera = model.camera(&model.frames[k], SIZE).unwrap().camera;
-        let (image, depth) = scene.view(&camera, SIZE);
-        save(&image, &dir.path().join(format!("{k}.png"))).unwrap();
-        write_map(&depth, &dir.path().join(format!("{k}.pfm")));
-    }
-    let arguments =
-        ["render", "s.toml", "--view", "2", "--truth", "2.png", "--json", "--force", "-o", "o.png"];
-    let psnr = || json(&run(dir.path(), &arguments))["psnr"].as_f64().unwrap();
-    let right = psnr();
-    write_cameras("0 0 0 0");
-    let wrong = psnr();
-    assert!(right > 31.0 && right > wrong + 3.0, "with the lens {right} dB, without {wrong} dB");
 }

@@ -1,6 +1,5 @@
 //! What several of the tests draw and compare with.
 
-pub(crate) mod bilinear;
 pub(crate) mod noise;
 pub(crate) mod normal;
 pub(crate) mod render;

@@ -143,11 +143,11 @@ impl Filter for Recursive {
     }
 
     fn state(&self) -> RecursiveState {
-        let tiling = self.feedthrough.tiling();
+        let tiling = &self.feedthrough.tiling;
         let padding = tiling.vector * self.channels;
         let states = self.recursion.states;
         // A vector may read the rows of some more frames, which mean nothing.
-        let rows = (BLOCK + self.output_matrix.tiling().vector) * states;
+        let rows = (BLOCK + self.output_matrix.tiling.vector) * states;
         RecursiveState {
             history: History::new(self.channels, tiling.history, BLOCK * self.channels, padding),
             rows: Aligned::new(rows),

@@ -16,7 +16,7 @@ const VECTOR_OUTPUTS: usize = 64;
 /// FIR filters from windows of frames to M phases.
 #[derive(Debug)]
 pub(crate) struct Polyphase<T: SimdElement> {
-    tiling: Tiling,
+    pub(crate) tiling: Tiling,
     /// M.
     ratio: usize,
     groups: Vec<PhaseGroup<T>>,
@@ -64,10 +64,6 @@ impl<T: SimdElement> Polyphase<T> {
             kernel: kernel.function(tiling.depth, width),
         };
         Self { tiling, ratio, groups: widths(ratio).map(group).collect() }
-    }
-
-    pub(crate) fn tiling(&self) -> &Tiling {
-        &self.tiling
     }
 
     /// Phase p of frame t goes to `out[t M + p]`. The t-th frame of a segment begins at
