@@ -7,8 +7,8 @@
 //! a ten thousandth of a period, which no look at the middle would find.
 
 use super::demand::Outputs;
-use super::estimator::{Estimator, EstimatorTaps, MeanSquare, TimedSample};
-use super::fusion::OutputGrid;
+use super::estimator::{EstimatorTaps, MeanSquare, TimedSample};
+use super::fusion::KnownInstantFusion;
 use super::recording::Recording;
 use hybank_core::units::FastPeriods;
 use hybank_linalg::{LinalgError, Mat, dot};
@@ -21,44 +21,39 @@ const MOST_LOSS: f64 = 1.023_292_992_280_754;
 const STANDSTILL: f64 = 1e-9;
 
 /// Taps for the frames of one stretch.
-pub(super) struct Stretch<'a> {
-    estimator: &'a Estimator,
-    recordings: &'a [Recording],
-    grid: OutputGrid,
-    /// Samples of each recording on either side.
-    reach: usize,
+#[derive(Debug)]
+pub(super) struct Stretch {
     /// The first of the samples of each recording for frame 0; it need not be there.
     starts: Vec<i64>,
+    /// Samples of each recording for a frame.
+    count: usize,
     /// Ascending by frame.
     knots: Vec<Knot>,
 }
 
 /// The best taps of a frame.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 struct Knot {
     frame: usize,
     taps: EstimatorTaps,
 }
 
-impl<'a> Stretch<'a> {
+impl Stretch {
     /// For these frames, over which no sample drifts by more than a fraction of its period.
     ///
     /// # Errors
     /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
-    pub(super) fn new(
-        estimator: &'a Estimator,
-        recordings: &'a [Recording],
-        grid: OutputGrid,
-        reach: usize,
-        frames: Range<usize>,
-    ) -> Result<Self, LinalgError> {
+    pub(super) fn new(fusion: &KnownInstantFusion<'_>, frames: Range<usize>) -> Result<Self, LinalgError> {
+        let (grid, reach) = (fusion.layout.grid, fusion.layout.reach);
         let middle = frames.start.midpoint(frames.end);
         let centre = grid.frame(middle) + FastPeriods(0.5 * (grid.ratio - 1) as f64);
         let start = |recording: &Recording| recording.nearest(centre) - middle as i64 - reach as i64 + 1;
-        let starts = recordings.iter().map(start).collect();
-        let mut stretch = Self { estimator, recordings, grid, reach, starts, knots: Vec::new() };
-        let (first, last) = (stretch.knot(frames.start)?, stretch.knot(frames.end)?);
-        stretch.refine(first, last.clone())?;
+        let starts = fusion.recordings.iter().map(start).collect();
+        let mut refinement =
+            Refinement { fusion, stretch: Self { starts, count: 2 * reach, knots: Vec::new() } };
+        let (first, last) = (refinement.knot(frames.start)?, refinement.knot(frames.end)?);
+        refinement.refine(first, last.clone())?;
+        let mut stretch = refinement.stretch;
         stretch.knots.push(last);
         Ok(stretch)
     }
@@ -66,29 +61,57 @@ impl<'a> Stretch<'a> {
     /// The samples of the recording `i` for a frame.
     fn numbers(&self, i: usize, frame: usize) -> Range<i64> {
         let start = self.starts[i] + frame as i64;
-        start..start + 2 * self.reach as i64
+        start..start + self.count as i64
     }
 
+    /// The outputs of a frame of the stretch; `None` where a sample is not there.
+    pub(super) fn frame(&self, recordings: &[Recording], frame: usize) -> Option<Outputs> {
+        let after = self.knots.partition_point(|knot| knot.frame <= frame).clamp(1, self.knots.len() - 1);
+        let [left, right] = [&self.knots[after - 1], &self.knots[after]];
+        let all = recordings.iter().enumerate();
+        let slices: Vec<&[f64]> =
+            all.map(|(i, recording)| recording.whole(self.numbers(i, frame))).collect::<Option<_>>()?;
+        let part = (frame - left.frame) as f64 / (right.frame - left.frame) as f64;
+        let between = |x: f64, y: f64| x + part * (y - x);
+        let output = |p: usize| between(left.output(p, &slices), right.output(p, &slices));
+        let [first, second] = [left, right].map(|knot| MeanSquare::mean(&knot.taps.errors));
+        let signal = between(first.signal, second.signal);
+        let error = MeanSquare { signal, noise: between(first.noise, second.noise) };
+        Some(Outputs { outputs: (0..left.taps.weights.ncols()).map(output).collect(), error })
+    }
+}
+
+/// A stretch whose knots are being made.
+struct Refinement<'a> {
+    fusion: &'a KnownInstantFusion<'a>,
+    stretch: Stretch,
+}
+
+impl Refinement<'_> {
     /// All samples for a frame, with instants relative to it.
     fn samples(&self, frame: usize) -> Vec<TimedSample> {
-        let origin = self.grid.frame(frame);
-        let of = |i: usize| {
-            self.numbers(i, frame).map(move |number| {
-                let sample = self.recordings[i].sample(number);
-                TimedSample { instant: sample.instant - origin, ..sample }
-            })
+        let origin = self.fusion.layout.grid.frame(frame);
+        let of = |(i, recording): (usize, &'_ Recording)| {
+            self.stretch
+                .numbers(i, frame)
+                .map(|number| {
+                    let sample = recording.sample(number);
+                    TimedSample { instant: sample.instant - origin, ..sample }
+                })
+                .collect::<Vec<_>>()
         };
-        (0..self.recordings.len()).flat_map(of).collect()
+        self.fusion.recordings.iter().enumerate().flat_map(of).collect()
     }
 
     fn knot(&self, frame: usize) -> Result<Knot, LinalgError> {
-        Ok(Knot { frame, taps: self.estimator.taps(&self.samples(frame), &self.grid.phases())? })
+        let phases = self.fusion.layout.grid.phases();
+        Ok(Knot { frame, taps: self.fusion.estimator.taps(&self.samples(frame), &phases)? })
     }
 
     /// Adds `left` and the knots between it and `right`.
     fn refine(&mut self, left: Knot, right: Knot) -> Result<(), LinalgError> {
         if right.frame - left.frame < 2 {
-            self.knots.push(left);
+            self.stretch.knots.push(left);
             return Ok(());
         }
         let frame = left.frame.midpoint(right.frame);
@@ -98,13 +121,13 @@ impl<'a> Stretch<'a> {
             return self.refine(middle, right);
         }
         let samples = self.samples(frame);
-        let set = self.estimator.set(&samples);
-        let with_target = set.with_target(&self.grid.phases());
+        let set = self.fusion.estimator.set(&samples);
+        let with_target = set.with_target(&self.fusion.layout.grid.phases());
         let middle = Knot { frame, taps: set.taps(&with_target)? };
         let on_line = set.errors(&halfway(&left, &right), &with_target);
         let mut pairs = on_line.iter().zip(&middle.taps.errors);
         if pairs.all(|(line, best)| line.total() <= MOST_LOSS * best.total()) {
-            self.knots.extend([left, middle]);
+            self.stretch.knots.extend([left, middle]);
             return Ok(());
         }
         self.refine(left, middle.clone())?;
@@ -113,43 +136,17 @@ impl<'a> Stretch<'a> {
 
     /// Whether two recorders sample at one instant between two frames.
     fn has_coincidence(&self, first: usize, last: usize) -> bool {
+        let recordings = self.fusion.recordings;
         let place = |i: usize, j: usize, frame: usize| {
-            let number = self.starts[i] + frame as i64;
-            let instant = self.recordings[i].clock().at(number as f64);
-            self.recordings[j].clock().sample_at(instant) - frame as f64
+            let instant = recordings[i].clock().at(self.stretch.numbers(i, frame).start as f64);
+            recordings[j].clock().sample_at(instant) - frame as f64
         };
         let meet = |i: usize, j: usize| {
             let [before, after] = [first, last].map(|frame| place(i, j, frame));
             before.floor() != after.floor() && (after - before).abs() > STANDSTILL
         };
-        let count = self.recordings.len();
+        let count = recordings.len();
         (0..count).any(|i| (0..i).any(|j| meet(i, j)))
-    }
-
-    /// The outputs of all frames, in their order; `None` where a sample is not there.
-    pub(super) fn frames(&self) -> impl Iterator<Item = (usize, Option<Outputs>)> {
-        self.knots.windows(2).flat_map(move |pair| {
-            let [left, right] = [&pair[0], &pair[1]];
-            (left.frame..right.frame).map(move |frame| (frame, self.frame(left, right, frame)))
-        })
-    }
-
-    fn frame(&self, left: &Knot, right: &Knot, frame: usize) -> Option<Outputs> {
-        let numbers: Vec<Range<i64>> = (0..self.recordings.len()).map(|i| self.numbers(i, frame)).collect();
-        if self.recordings.iter().zip(&numbers).any(|(recording, samples)| !recording.is_whole(samples)) {
-            return None;
-        }
-        let slice = |(recording, numbers): (&'a Recording, &Range<i64>)| {
-            &recording.samples()[numbers.start as usize..numbers.end as usize]
-        };
-        let slices: Vec<&[f64]> = self.recordings.iter().zip(&numbers).map(slice).collect();
-        let part = (frame - left.frame) as f64 / (right.frame - left.frame) as f64;
-        let between = |x: f64, y: f64| x + part * (y - x);
-        let output = |p: usize| between(left.output(p, &slices), right.output(p, &slices));
-        let [first, second] = [left, right].map(|knot| MeanSquare::mean(&knot.taps.errors));
-        let signal = between(first.signal, second.signal);
-        let error = MeanSquare { signal, noise: between(first.noise, second.noise) };
-        Some(Outputs { outputs: (0..self.grid.ratio).map(output).collect(), error })
     }
 }
 

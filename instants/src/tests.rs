@@ -222,8 +222,7 @@ fn a_drift_is_followed_as_predicted() {
             .iter()
             .flat_map(|recording| {
                 let nearest = recording.nearest(at);
-                (nearest - 23..=nearest + 24)
-                    .map(move |k| (recording.sample(k), recording.samples()[k as usize]))
+                (nearest - 23..=nearest + 24).map(move |k| (recording.sample(k), recording.value(k as usize)))
             })
             .collect();
         let (samples, values): (Vec<TimedSample>, Vec<f64>) = samples.into_iter().unzip();
@@ -245,6 +244,39 @@ fn cuts_and_threads_change_no_bit() {
     let again =
         one.install(|| fuse(&estimator, &recordings, FusionSettings { count: 2990, ..settings })).unwrap();
     assert_eq!(whole.samples[..2560], again.samples[..2560]);
+}
+
+/// However samples arrive, also with lost ones, over several stretches.
+#[test]
+fn live_outputs_do_not_depend_on_cuts() {
+    let (estimator, whole) = drifting(13);
+    let live = |lengths: &mut dyn Iterator<Item = usize>| {
+        let none = whole.iter().map(|one| Recording::new(Vec::new(), one.clock().clone(), one.converter()));
+        let mut live = LiveFusion::new(estimator.clone(), none.collect(), FastPeriods(100.0), 16);
+        let (mut samples, mut errors, mut late, mut start) = (Vec::new(), Vec::new(), 0, 0);
+        while start < 3000 {
+            let end = (start + lengths.next().unwrap()).min(3000);
+            let fused = live.push(whole.iter().map(|one| one.samples()[start..end].iter().copied())).unwrap();
+            samples.extend(fused.samples);
+            errors.extend(fused.errors);
+            late = late.max(end.saturating_sub(samples.len() / 2));
+            start = end;
+        }
+        let fused = live.finish(5850).unwrap();
+        samples.extend(fused.samples);
+        errors.extend(fused.errors);
+        (samples, errors, late)
+    };
+    let (samples, errors, _) = live(&mut std::iter::repeat(3000));
+    assert_eq!((samples.len(), errors.len()), (5850, 46));
+    for length in [1, 64, 777] {
+        let (again, as_well, late) = live(&mut std::iter::repeat(length));
+        assert!(samples == again && errors == as_well, "{length}");
+        // 50 frames before the first output, 64 of a block, and those of the longest time.
+        assert!(late <= 50 + 64 + 50 + length, "{length}: {late}");
+    }
+    let settings = FusionSettings { first: FastPeriods(100.0), count: 5850, reach: 16 };
+    assert_eq!(fuse(&estimator, &whole, settings).unwrap().samples[..4096], samples[..4096]);
 }
 
 /// Two rates that share nothing, and stamps with jitter.
