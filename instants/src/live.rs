@@ -63,6 +63,11 @@ impl LiveFusion {
         Self { maker: Arc::new(maker), recordings, blocks: 0, taps: BTreeMap::new() }
     }
 
+    /// Outputs of a block.
+    pub fn block(&self) -> usize {
+        FRAMES_PER_BLOCK * self.maker.layout.grid.ratio
+    }
+
     /// Takes the next samples of each recording, and gives the outputs that depend on no later ones.
     ///
     /// # Errors
@@ -72,9 +77,8 @@ impl LiveFusion {
         samples: impl IntoIterator<Item = S>,
     ) -> Result<Fused, LinalgError> {
         self.recordings.iter_mut().zip(samples).for_each(|(recording, samples)| recording.extend(samples));
-        let Layout { grid, .. } = self.maker.layout;
         let next = self.recordings.iter().map(|recording| recording.next().0).fold(f64::INFINITY, f64::min);
-        let known = (next - self.maker.within.0 - grid.first.0) / (FRAMES_PER_BLOCK * grid.ratio) as f64;
+        let known = (next - self.maker.within.0 - self.maker.layout.grid.first.0) / self.block() as f64;
         self.run(self.blocks..known.max(0.0) as usize)
     }
 
@@ -83,7 +87,7 @@ impl LiveFusion {
     /// # Errors
     /// As [`LiveFusion::push`].
     pub fn finish(mut self, count: usize) -> Result<Fused, LinalgError> {
-        let per_block = FRAMES_PER_BLOCK * self.maker.layout.grid.ratio;
+        let per_block = self.block();
         let given = self.blocks * per_block;
         let mut fused = self.run(self.blocks..count.div_ceil(per_block))?;
         fused.samples.truncate(count.saturating_sub(given));
