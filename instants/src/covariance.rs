@@ -1,6 +1,6 @@
 //! A covariance as a function of the time between two samples.
 
-use hybank_linalg::Complex;
+use hybank_linalg::{Complex, Mat};
 use std::f64::consts::{PI, TAU};
 
 /// Points of the table per period of the highest frequency. Interpolation by twelve points errs by 2e-15 of
@@ -11,10 +11,11 @@ const ORDER: usize = 12;
 /// Coefficients of the polynomial between two points: 64 bytes, a line of the cache. In place of the
 /// interpolation it errs by 1e-16 of the power.
 const COEFFICIENTS: usize = 8;
-/// Steps after which a phasor is computed again, so that products do not collect rounding errors.
-const RENEWAL: usize = 256;
-/// Terms that are summed side by side.
-const LANES: usize = 8;
+/// Values from one time for which phasors are computed to the next; those between are turned, so that products
+/// do not collect rounding errors.
+const RENEWAL: usize = 128;
+/// Terms that are summed at a time, for the sake of memory.
+const TERMS: usize = 512;
 
 /// `c(t) = sum_q p_q Re(z_q e^{2 pi j f_q t})` for |t| up to a limit, as polynomials between points of time.
 #[derive(Debug, Clone)]
@@ -50,14 +51,8 @@ impl Covariance {
         let first = -(half as f64) / density;
         let is_even = terms.iter().all(|term| term.amplitude.im == 0.0);
         let begin = if is_even { half } else { 0 };
-        let mut values = vec![0.0; 2 * half + 1];
-        for group in terms.chunks(LANES) {
-            let turns = Turns::new(group, 1.0 / density);
-            for (number, chunk) in values[begin..].chunks_mut(RENEWAL).enumerate() {
-                let start = first + (begin + number * RENEWAL) as f64 / density;
-                turns.add(group, start, chunk);
-            }
-        }
+        let mut values = sums(terms, first + begin as f64 / density, 1.0 / density, 2 * half + 1 - begin);
+        values.splice(0..0, std::iter::repeat_n(0.0, begin));
         for k in 0..begin {
             values[k] = values[2 * half - k];
         }
@@ -116,37 +111,29 @@ impl Economy {
     }
 }
 
-/// What some terms turn by from value to value. Their products do not wait for one another.
-struct Turns {
-    cosines: [f64; LANES],
-    sines: [f64; LANES],
-}
-
-impl Turns {
-    fn new(terms: &[Term], step: f64) -> Self {
-        let (mut cosines, mut sines) = ([0.0; LANES], [0.0; LANES]);
-        for (lane, term) in terms.iter().enumerate() {
-            (sines[lane], cosines[lane]) = (TAU * term.frequency * step).sin_cos();
-        }
-        Self { cosines, sines }
-    }
-
-    /// Adds the sum of the terms, whose turns these are, from a time on.
-    fn add(&self, terms: &[Term], start: f64, values: &mut [f64]) {
-        let (mut real, mut imaginary) = ([0.0; LANES], [0.0; LANES]);
-        for (lane, term) in terms.iter().enumerate() {
-            let phasor = term.amplitude * Complex::from_polar(1.0, TAU * term.frequency * start);
-            (real[lane], imaginary[lane]) = (phasor.re, phasor.im);
-        }
-        for value in values {
-            *value += real.iter().sum::<f64>();
-            for lane in 0..LANES {
-                let (re, im) = (real[lane], imaginary[lane]);
-                real[lane] = re * self.cosines[lane] - im * self.sines[lane];
-                imaginary[lane] = re * self.sines[lane] + im * self.cosines[lane];
+/// The sums of terms at `count` times. A time is one of few and a step of few more, and a term the product of
+/// two phasors, so the sums are products of matrices.
+fn sums(terms: &[Term], first: f64, step: f64, count: usize) -> Vec<f64> {
+    let begins: Vec<f64> = (0..count).step_by(RENEWAL).map(|n| first + n as f64 * step).collect();
+    let mut values = Mat::zeros(RENEWAL, begins.len());
+    for terms in terms.chunks(TERMS) {
+        let mut turns = Mat::zeros(RENEWAL, 2 * terms.len());
+        for (q, Term { frequency, .. }) in terms.iter().enumerate() {
+            let turn = Complex::from_polar(1.0, TAU * frequency * step);
+            let mut turned = Complex::from(1.0);
+            for n in 0..RENEWAL {
+                (turns[(n, 2 * q)], turns[(n, 2 * q + 1)]) = (turned.re, -turned.im);
+                turned *= turn;
             }
         }
+        let phasor = |row: usize, begin: usize| {
+            let Term { frequency, amplitude } = terms[row / 2];
+            let phasor = amplitude * Complex::from_polar(1.0, TAU * frequency * begins[begin]);
+            if row % 2 == 0 { phasor.re } else { phasor.im }
+        };
+        values.gemm(1.0, &turns, &Mat::from_fn(2 * terms.len(), begins.len(), phasor), 1.0);
     }
+    values.as_slice()[..count].to_vec()
 }
 
 /// The weights of the values at -5, -4, .., 6 for the polynomial through them at x in [0, 1).
