@@ -1,10 +1,10 @@
-//! Recorders of nearly one rate: taps for the instants at knots of time, and lines between them.
+//! Recorders of nearly one rate: taps for the instants at knots of time, and curves between them.
 //!
 //! From frame to frame the samples move along with the outputs, only their offsets drift. So a set of taps
-//! serves for many frames, and between two knots the taps are on lines. Knots lie at absolute frames, dense
-//! where taps change fast: an interval is halved as long as a line through its ends is worse in its middle
-//! than the best taps there, or two recorders sample at one instant within it. There taps change sign within
-//! a ten thousandth of a period, which no look at the middle would find.
+//! serves for many frames, and between knots the taps are on parabolas. Knots lie at absolute frames, dense
+//! where taps change fast: an interval is halved as long as a curve through its ends and the knot beside it is
+//! worse in its middle than the best taps there, or the samples next to an output are at one instant within
+//! it. There taps change sign within a ten thousandth of a period, which no look at the middle would find.
 
 use super::demand::Outputs;
 use super::estimator::{EstimatorTaps, MeanSquare, TimedSample};
@@ -29,6 +29,17 @@ pub(super) struct Stretch {
     count: usize,
     /// Ascending by frame.
     knots: Vec<Knot>,
+    /// Ascending by frame, each up to the next one.
+    curves: Vec<Curve>,
+}
+
+/// Taps of the frames from one knot on, on a curve through this and the next ones.
+#[derive(Debug, Clone, Copy)]
+struct Curve {
+    /// The number of the first knot.
+    first: usize,
+    /// How many.
+    count: usize,
 }
 
 /// The best taps of a frame.
@@ -49,10 +60,10 @@ impl Stretch {
         let centre = grid.frame(middle) + FastPeriods(0.5 * (grid.ratio - 1) as f64);
         let start = |recording: &Recording| recording.nearest(centre) - middle as i64 - reach as i64 + 1;
         let starts = fusion.recordings.iter().map(start).collect();
-        let mut refinement =
-            Refinement { fusion, stretch: Self { starts, count: 2 * reach, knots: Vec::new() } };
+        let stretch = Self { starts, count: 2 * reach, knots: Vec::new(), curves: Vec::new() };
+        let mut refinement = Refinement { fusion, stretch };
         let (first, last) = (refinement.knot(frames.start)?, refinement.knot(frames.end)?);
-        refinement.refine(first, last.clone())?;
+        refinement.refine(first, last.clone(), None)?;
         let mut stretch = refinement.stretch;
         stretch.knots.push(last);
         Ok(stretch)
@@ -66,18 +77,19 @@ impl Stretch {
 
     /// The outputs of a frame of the stretch; `None` where a sample is not there.
     pub(super) fn frame(&self, recordings: &[Recording], frame: usize) -> Option<Outputs> {
-        let after = self.knots.partition_point(|knot| knot.frame <= frame).clamp(1, self.knots.len() - 1);
-        let [left, right] = [&self.knots[after - 1], &self.knots[after]];
+        let after = self.curves.partition_point(|curve| self.knots[curve.first].frame <= frame).max(1);
+        let Curve { first, count } = self.curves[after - 1];
+        let knots: Vec<&Knot> = self.knots[first..first + count].iter().collect();
         let all = recordings.iter().enumerate();
         let slices: Vec<&[f64]> =
             all.map(|(i, recording)| recording.whole(self.numbers(i, frame))).collect::<Option<_>>()?;
-        let part = (frame - left.frame) as f64 / (right.frame - left.frame) as f64;
-        let between = |x: f64, y: f64| x + part * (y - x);
-        let output = |p: usize| between(left.output(p, &slices), right.output(p, &slices));
-        let [first, second] = [left, right].map(|knot| MeanSquare::mean(&knot.taps.errors));
-        let signal = between(first.signal, second.signal);
-        let error = MeanSquare { signal, noise: between(first.noise, second.noise) };
-        Some(Outputs { outputs: (0..left.taps.weights.ncols()).map(output).collect(), error })
+        let shares = shares(&knots, frame);
+        let output = |p: usize| {
+            knots.iter().zip(&shares).map(|(knot, share)| share * knot.output(p, &slices)).sum::<f64>()
+        };
+        let outputs = (0..knots[0].taps.weights.ncols()).map(output).collect();
+        let right = knots.partition_point(|knot| knot.frame <= frame).clamp(1, count - 1);
+        Some(Outputs { outputs, error: between(knots[right - 1], knots[right], frame) })
     }
 }
 
@@ -108,37 +120,47 @@ impl Refinement<'_> {
         Ok(Knot { frame, taps: self.fusion.estimator.taps(&self.samples(frame), &phases)? })
     }
 
-    /// Adds `left` and the knots between it and `right`.
-    fn refine(&mut self, left: Knot, right: Knot) -> Result<(), LinalgError> {
+    /// Adds `left` and the knots between it and `right`; `beside` is another one near to both, without a
+    /// coincidence between them.
+    fn refine(&mut self, left: Knot, right: Knot, beside: Option<&Knot>) -> Result<(), LinalgError> {
         if right.frame - left.frame < 2 {
-            self.stretch.knots.push(left);
+            self.add([left]);
             return Ok(());
         }
         let frame = left.frame.midpoint(right.frame);
         if self.has_coincidence(left.frame, right.frame) {
             let middle = self.knot(frame)?;
-            self.refine(left, middle.clone())?;
-            return self.refine(middle, right);
+            self.refine(left, middle.clone(), None)?;
+            return self.refine(middle, right, None);
         }
         let samples = self.samples(frame);
         let set = self.fusion.estimator.set(&samples);
         let with_target = set.with_target(&self.fusion.layout.grid.phases());
         let middle = Knot { frame, taps: set.taps(&with_target)? };
-        let on_line = set.errors(&halfway(&left, &right), &with_target);
-        let mut pairs = on_line.iter().zip(&middle.taps.errors);
-        if pairs.all(|(line, best)| line.total() <= MOST_LOSS * best.total()) {
-            self.stretch.knots.extend([left, middle]);
+        let known: Vec<&Knot> = [&left, &right].into_iter().chain(beside).collect();
+        let on_curve = set.errors(&combined(&known, frame), &with_target);
+        let mut pairs = on_curve.iter().zip(&middle.taps.errors);
+        if pairs.all(|(curve, best)| curve.total() <= MOST_LOSS * best.total()) {
+            self.add([left, middle]);
             return Ok(());
         }
-        self.refine(left, middle.clone())?;
-        self.refine(middle, right)
+        self.refine(left.clone(), middle.clone(), Some(&right))?;
+        self.refine(middle, right, Some(&left))
     }
 
-    /// Whether two recorders sample at one instant between two frames.
+    /// Adds knots whose curve goes on to the knot that comes next.
+    fn add<const COUNT: usize>(&mut self, knots: [Knot; COUNT]) {
+        let Stretch { knots: all, curves, .. } = &mut self.stretch;
+        curves.push(Curve { first: all.len(), count: COUNT + 1 });
+        all.extend(knots);
+    }
+
+    /// Whether two recorders sample at one instant, in the middle of their samples, between two frames.
     fn has_coincidence(&self, first: usize, last: usize) -> bool {
         let recordings = self.fusion.recordings;
         let place = |i: usize, j: usize, frame: usize| {
-            let instant = recordings[i].clock().at(self.stretch.numbers(i, frame).start as f64);
+            let Range { start, end } = self.stretch.numbers(i, frame);
+            let instant = recordings[i].clock().at(0.5 * (start + end) as f64);
             recordings[j].clock().sample_at(instant) - frame as f64
         };
         let meet = |i: usize, j: usize| {
@@ -160,6 +182,27 @@ impl Knot {
     }
 }
 
-fn halfway(left: &Knot, right: &Knot) -> Mat {
-    (&left.taps.weights + &right.taps.weights) * 0.5
+/// The shares of knots in the taps of a frame on the curve through them.
+fn shares(knots: &[&Knot], frame: usize) -> Vec<f64> {
+    let share = |knot: &&Knot| {
+        let others = knots.iter().filter(|other| other.frame != knot.frame);
+        let factor =
+            |other: &&Knot| (frame as f64 - other.frame as f64) / (knot.frame as f64 - other.frame as f64);
+        others.map(factor).product()
+    };
+    knots.iter().map(share).collect()
+}
+
+/// The taps of a frame on the curve through knots.
+fn combined(knots: &[&Knot], frame: usize) -> Mat {
+    let parts = knots.iter().zip(shares(knots, frame)).map(|(knot, share)| &knot.taps.weights * share);
+    parts.reduce(|sum, part| sum + part).unwrap_or_default()
+}
+
+/// The error at a frame, on a line between those of two knots.
+fn between(left: &Knot, right: &Knot, frame: usize) -> MeanSquare {
+    let [first, second] = [left, right].map(|knot| MeanSquare::mean(&knot.taps.errors));
+    let part = (frame - left.frame) as f64 / (right.frame - left.frame) as f64;
+    let on_line = |x: f64, y: f64| x + part * (y - x);
+    MeanSquare { signal: on_line(first.signal, second.signal), noise: on_line(first.noise, second.noise) }
 }

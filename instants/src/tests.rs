@@ -370,3 +370,33 @@ fn recordings_tell_their_noise_and_the_error_is_as_predicted() {
     let apart = decibels(found) - decibels(predicted);
     assert!(apart.abs() < 1.0, "{} {}", decibels(found), decibels(predicted));
 }
+
+/// Where two recorders come to sample at one instant the stated errors are those of exact taps.
+#[test]
+fn errors_over_a_coincidence_are_those_of_exact_taps() {
+    let clocks = [
+        Clock::even(FastPeriods(0.0), FastPeriods(2.0)),
+        Clock::even(FastPeriods(-0.1), FastPeriods(2.00004)),
+    ];
+    let recording =
+        |i: usize| Recording::new(cosines(&clocks[i], 3500, 0..0, 2e-4, 3 + i as u64), clocks[i].clone(), i);
+    let recordings = [0, 1].map(recording);
+    let estimator = of_band(vec![Converter::exact(0, 1.0, 4e-8); 2], 260.0);
+    let settings = FusionSettings { first: FastPeriods(4000.0), count: 2048, reach: 24 };
+    let fused = fuse(&estimator, &recordings, settings).unwrap();
+    let stated = fused.errors.iter().map(|error| error.total()).sum::<f64>() / 16.0;
+    let best = |n: usize| {
+        let at = FastPeriods(4000.0 + n as f64);
+        let around = |one: &Recording| {
+            let nearest = one.nearest(at);
+            (nearest - 23..=nearest + 24).map(|k| one.sample(k)).collect::<Vec<_>>()
+        };
+        let samples: Vec<TimedSample> = recordings.iter().flat_map(around).collect();
+        estimator.taps(&samples, &[at]).unwrap().errors[0].total()
+    };
+    let exact = (0..2048).map(best).sum::<f64>() / 2048.0;
+    let measured = error_of(&fused, 4000.0, 0..2048);
+    assert!(exact > 1e-3 && (stated / exact - 1.0).abs() < 0.02, "{stated} {exact}");
+    // One coincidence is a small sample.
+    assert!((0.3..3.0).contains(&(measured / exact)), "{measured} {exact}");
+}
