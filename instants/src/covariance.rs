@@ -11,8 +11,8 @@ const ORDER: usize = 12;
 /// Coefficients of the polynomial between two points: 64 bytes, a line of the cache. In place of the
 /// interpolation it errs by 1e-16 of the power.
 const COEFFICIENTS: usize = 8;
-/// Values from one time for which phasors are computed to the next; those between are turned, so that products
-/// do not collect rounding errors.
+/// Values from one time for which phasors are computed to the next; those between are turned, so that
+/// products do not collect rounding errors.
 const RENEWAL: usize = 128;
 /// Terms that are summed at a time, for the sake of memory.
 const TERMS: usize = 512;

@@ -16,8 +16,8 @@ use std::sync::{Arc, OnceLock};
 type Taps = Arc<OnceLock<Result<Option<Stretch>, LinalgError>>>;
 
 /// Estimates the target as samples arrive, a block of 64 frames as soon as all samples are there that may
-/// count in it. An output has the same bits however the samples are cut. The taps of the next stretch are made
-/// on another thread.
+/// count in it. An output has the same bits however the samples are cut. The taps of the next stretch are
+/// made on another thread.
 #[derive(Debug)]
 pub struct LiveFusion {
     maker: Arc<TapMaker>,

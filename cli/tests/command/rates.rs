@@ -246,8 +246,8 @@ fn worst_cases_take_one_error_per_converter() {
     desk.refused(1, &["analyze", "bank.json", "--delay-error", "0,0,0,1e-9,1e-9"], &["2"]);
 }
 
-/// Converters that sample later than their frame begins: the design is that of delays two fast periods larger,
-/// and the output lies on the time axis.
+/// Converters that sample later than their frame begins: the design is that of delays two fast periods
+/// larger, and the output lies on the time axis.
 #[test]
 fn negative_delays_count_from_a_later_instant() {
     let desk = Desk::new();
