@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 pub(super) struct BeforeAfterArgs {
     /// Measure the recording of a tone before, as plain interleaving of the inputs, and after, as
     /// `hybank measure` does
-    #[arg(long)]
+    #[arg(long, conflicts_with = "track")]
     measure: bool,
     /// Tones to measure (9kHz, 1.2GHz, or hertz); auto: the largest one
     #[arg(long, value_name = "F,..", value_delimiter = ',', value_parser = tone, requires = "measure")]

@@ -5,12 +5,12 @@ use super::before_after::{self, BeforeAfterArgs};
 use super::bit_true::BitTrueArgs;
 use super::capture_args::CaptureArgs;
 use super::observer::RunObserver;
-use super::output::{bits, check_files, container_of};
+use super::output::{bits, container_of};
 use super::print::{Failure, is_dash, print, print_report, say_understood};
 use super::run::{BankRun, Finished, RunArgs, RunReport};
-use super::tracked::{self, TrackArgs};
+use super::tracked::{self, InstantArgs};
 use hybank::bank::Bank;
-use hybank::io::{Container, MultiReader, OnStall, PcmFormat};
+use hybank::io::{MultiReader, OnStall, PcmFormat};
 use hybank::messages::{Quoted, counted};
 use hybank::overview::BeforeAfter;
 use hybank::pipeline::DroppedLatency;
@@ -48,14 +48,14 @@ pub(super) struct Args {
     #[arg(long, value_parser = bits(), default_value = "32f")]
     bits: PcmFormat,
     /// Keep the bank's latency: the causal output, as `stream` gives it
-    #[arg(long)]
+    #[arg(long, conflicts_with = "track")]
     keep_latency: bool,
     #[command(flatten)]
     reading: CaptureArgs,
     #[command(flatten)]
     bit_true: BitTrueArgs,
     #[command(flatten)]
-    track: TrackArgs,
+    instants: InstantArgs,
     #[command(flatten)]
     before_after: BeforeAfterArgs,
     #[command(flatten)]
@@ -122,9 +122,7 @@ impl Args {
     fn check(&self) -> Result<(), Failure> {
         self.reading.check(self.run.interleaved.is_given())?;
         self.before_after.check(&self.inputs, &self.output, self.run.force)?;
-        if let Some(table) = self.track.file() {
-            check_files(&self.output, Container::Wav, &[], &[table])?;
-        }
+        self.instants.track.check(&self.output)?;
         let prints = self.before_after.is_wanted();
         self.run.check(&self.bank, &self.inputs, &self.output, container_of(&self.output), prints)
     }
@@ -146,15 +144,17 @@ impl Args {
 
     fn fuse(&self, job: &BankRun<'_>, observer: &mut RunObserver) -> Result<(), Failure> {
         let begin = Instant::now();
-        if self.track.has_stamps() {
+        if self.instants.stamps {
             return tracked::fuse_stamps(job, &self.inputs, &self.reading.format());
         }
+        let track = self.instants.track.file();
+        let tracked = track.map(|table| tracked::fusion(job, table)).transpose()?;
         let mut reader = self.start_reader(job, &mut |stall| observer.stalled(stall))?;
         if self.bit_true.is_wanted() {
             return self.bit_true.fuse(job, &mut reader, observer, || self.measured(job));
         }
-        if let Some(table) = self.track.file() {
-            return tracked::fuse(job, table, reader);
+        if let Some(fusion) = tracked {
+            return tracked::run(job, fusion, reader, observer);
         }
         let rate = job.output_rate(&reader)?;
         let progress = progress_bar(reader.promised_frames());

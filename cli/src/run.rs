@@ -218,7 +218,7 @@ impl BankRun<'_> {
     }
 
     /// The outputs at their beginning, of `rate` hertz.
-    fn outputs(&self, rate: f64, is_complex: bool) -> Result<FileOutputs, Failure> {
+    pub(super) fn outputs(&self, rate: f64, is_complex: bool) -> Result<FileOutputs, Failure> {
         let Self { args, container, format, .. } = *self;
         let mask = args.gaps.begin_mask(args.force)?;
         let header = OutputHeader { container, format, is_complex, rate };

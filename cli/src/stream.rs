@@ -6,6 +6,7 @@ use super::output::is_wav;
 use super::print::{print_report, say_line, say_understood};
 use super::run::{BankRun, Finished, RunArgs, RunReport};
 use super::table_args::TableArgs;
+use super::tracked::{self, TrackArgs};
 use super::{Failure, bank_file};
 use hybank::bank::Bank;
 use hybank::captures::FileFormat;
@@ -64,8 +65,10 @@ pub(super) struct Args {
     #[arg(short, long, default_value = "-")]
     output: PathBuf,
     /// Output the last samples at the end, as many as the latency, with zeros for input
-    #[arg(long)]
+    #[arg(long, conflicts_with = "track")]
     flush: bool,
+    #[command(flatten)]
+    track: TrackArgs,
     #[command(flatten)]
     run: RunArgs,
 }
@@ -101,6 +104,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let inputs = args.inputs();
     check_channels(args.channels, args.format)?;
     args.run.check(&args.bank, &inputs, &args.output, args.container(), false)?;
+    args.track.check(&args.output)?;
     let bank = bank_file::load(&args.bank)?;
     say_understood(bank.spec.as_ref());
     args.check_inputs(&inputs, bank.channel_count())?;
@@ -134,6 +138,7 @@ impl Args {
     ) -> Result<(), Failure> {
         // Before the inputs come; their headers may say complex samples.
         let plan = job.plan()?;
+        let tracked = self.track.file().map(|table| tracked::fusion(job, table)).transpose()?;
         let channels = self.channels.map(usize::from);
         let format = FileFormat {
             coding: self.format,
@@ -145,6 +150,9 @@ impl Args {
         };
         let mut reader = job.start_reader(inputs, format, &mut |stall| observer.stalled(stall))?;
         self.check_output(reader.is_complex())?;
+        if let Some(fusion) = tracked {
+            return tracked::run(job, fusion, reader, observer);
+        }
         let finished = job.run(&plan, &mut reader, observer, &|_| {})?;
         let Finished { report: run, frames, is_interrupted, .. } = &finished;
         let report = StreamReport { run, frames: *frames, interrupted: *is_interrupted };

@@ -1,18 +1,24 @@
-//! `fuse --track` and `fuse --stamps`: delays that change, from a table, and samples with stamps of their
-//! own.
+//! `--track` of `fuse` and `stream`, and `fuse --stamps`: delays that change, from a table, and samples with
+//! stamps of their own.
 
-use super::capture_file::unread;
-use super::print::{Failure, check_strict, failed, failed_at, is_dash, print, print_report, warn};
-use super::run::BankRun;
-use super::written::{Mono, begin_recording};
+use super::interrupt::interrupts;
+use super::observer::RunObserver;
+use super::print::{
+    Failure, check_strict, failed, failed_at, is_dash, print, print_report, say_line, stopped, warn,
+    with_remains,
+};
+use super::run::{BankRun, each_block, frames_of};
+use super::written::{Mono, begin_recording, check_outputs};
 use hybank::bank::Bank;
-use hybank::captures::{Captures, Converters, FileFormat};
+use hybank::captures::{Converters, FileFormat};
 use hybank::files::{Bound, commit_all, read_text};
-use hybank::io::MultiReader;
 use hybank::io::table::{TableOptions, read_stamped};
-use hybank::merge::{DelayTrack, MergeError, Tracked, fuse_stamped, fuse_tracked};
+use hybank::io::{MultiReader, RecordedFrames};
+use hybank::merge::{DelayTrack, MergeError, PredictedQuality, TrackedFusion, fuse_stamped};
 use hybank::messages::{Quoted, counted};
+use hybank::pipeline::{Block, FileOutputs, Warning};
 use hybank::quantity::readable;
+use hybank::runtime::FrameSource;
 use hybank::units::Seconds;
 use std::path::{Path, PathBuf};
 
@@ -23,20 +29,28 @@ const TABLE: Bound = Bound {
     remedy: "give the file that was meant, or fewer lines",
 };
 
-/// The option.
+/// Options of `fuse`.
 #[derive(Debug, clap::Args)]
-pub(super) struct TrackArgs {
-    /// Follow delays that change: drift.jsonl of `align --trim`, or a table (.csv) of a time and the delay
-    /// of each channel, both in seconds, with headings, as `time,delay 1,delay 2`. Taps are made for the
-    /// delays at hand in place of those of the spec; lost samples are left out
-    #[arg(long, value_name = "FILE", conflicts_with_all =
-          ["bit_true", "algorithm", "gaps", "keep_latency", "measure", "report", "interleaved", "threads"])]
-    track: Option<PathBuf>,
+pub(super) struct InstantArgs {
+    #[command(flatten)]
+    pub(super) track: TrackArgs,
     /// Each capture is a table (.csv) whose first column says when its samples were taken: taps are made for
     /// these instants in place of the delays of the spec
     #[arg(long, conflicts_with_all = ["track", "bit_true", "algorithm", "gaps", "keep_latency", "measure", "report",
           "interleaved", "threads"])]
-    stamps: bool,
+    pub(super) stamps: bool,
+}
+
+/// The option that `fuse` and `stream` have.
+#[derive(Debug, clap::Args)]
+pub(super) struct TrackArgs {
+    /// Follow delays that change: drift.jsonl of `align --trim`, or a table (.csv) of a time and the delay
+    /// of each channel, both in seconds, with headings, as `time,delay 1,delay 2`. Taps are made for the
+    /// delays at hand in place of those of the spec; lost samples are left out. `stream` gives the samples of
+    /// `fuse`, blocks of 64 frames as soon as the 38 frames after them are there
+    #[arg(long, value_name = "FILE", conflicts_with_all =
+          ["algorithm", "gaps", "report", "interleaved", "threads"])]
+    track: Option<PathBuf>,
 }
 
 #[derive(Debug, serde::Serialize)]
@@ -49,13 +63,15 @@ struct TrackedReport {
     worst_second_db: f64,
     /// After the first sample.
     worst_second_at: f64,
+    /// True if a signal ended the stream.
+    interrupted: bool,
     warnings: Vec<String>,
 }
 
 impl TrackArgs {
-    /// Whether samples have stamps.
-    pub(super) fn has_stamps(&self) -> bool {
-        self.stamps
+    /// Refuses an output over the table.
+    pub(super) fn check(&self, output: &Path) -> Result<(), Failure> {
+        self.file().map_or(Ok(()), |table| check_outputs(&[output], &[table]))
     }
 
     /// The table, if one is given.
@@ -64,23 +80,96 @@ impl TrackArgs {
     }
 }
 
-/// Fuses what `reader` gives by the delays of a table.
-pub(super) fn fuse(job: &BankRun<'_>, table: &Path, mut reader: MultiReader) -> Result<(), Failure> {
+/// What fuses by the delays of a table.
+pub(super) fn fusion(job: &BankRun<'_>, table: &Path) -> Result<TrackedFusion, Failure> {
     let track = read(table, job.bank)?;
+    TrackedFusion::new(job.bank, &track).map_err(|error| match error {
+        MergeError::Design(_) | MergeError::OwnRates => failed_at(job.bank_path, error),
+        error => failed_at(table, error),
+    })
+}
+
+/// Fuses what `reader` gives.
+pub(super) fn run(
+    job: &BankRun<'_>,
+    fusion: TrackedFusion,
+    mut reader: MultiReader,
+    observer: &mut RunObserver,
+) -> Result<(), Failure> {
     let rate = job.output_rate(&reader)?;
     if reader.is_complex() {
         return Err(Failure::Input(
             "--track: the samples are complex, and only real ones are fused by a table".into(),
         ));
     }
-    let captures = Captures::read(&mut reader, usize::MAX).map_err(unread)?;
-    let channels: Vec<Vec<f64>> = captures.channels.into_iter().map(|channel| channel.samples).collect();
-    let tracked = fuse_tracked(job.bank, &channels, &track).map_err(|error| match error {
-        MergeError::Design(_) | MergeError::OwnRates => failed_at(job.bank_path, error),
-        MergeError::NoSamples => failed(error),
-        error => failed_at(table, error),
-    })?;
-    write(job, &tracked, rate, reader.warnings().iter().map(ToString::to_string).collect())
+    let mut outputs = job.outputs(rate, false)?;
+    let mut kept = Vec::new();
+    if job.is_live {
+        // What is recorded live cannot be recorded again.
+        kept = outputs.keep();
+        reader.stop_at(interrupts());
+    }
+    let run = TrackedRun { job, outputs, rate, samples: 0, clipped: 0 };
+    run.all(fusion, &mut reader, observer).map_err(|failure| with_remains(failure, &kept))
+}
+
+/// Outputs on their way.
+struct TrackedRun<'a> {
+    job: &'a BankRun<'a>,
+    outputs: FileOutputs,
+    rate: f64,
+    samples: usize,
+    clipped: u64,
+}
+
+impl TrackedRun<'_> {
+    fn all(
+        mut self,
+        mut fusion: TrackedFusion,
+        reader: &mut MultiReader,
+        observer: &mut RunObserver,
+    ) -> Result<(), Failure> {
+        let interrupted = each_block(reader, observer, |_, recordings| {
+            self.write(&fusion.push(&channels(recordings)).map_err(failed)?)
+        })?;
+        let (last, quality) = fusion.finish().map_err(failed)?;
+        self.write(&last)?;
+        let Self { job, outputs, rate, samples, clipped } = self;
+        let clipped =
+            (clipped > 0).then(|| format!("{}; {} keeps them", Warning::Clipped(clipped), job.lossless));
+        let warnings: Vec<String> =
+            reader.warnings().iter().map(ToString::to_string).chain(clipped).collect();
+        check_strict(&warnings, job.args.strict)?;
+        outputs.finish().map_err(stopped)?;
+        warnings.iter().for_each(|text| warn(text));
+        if interrupted {
+            say_line(&format!("interrupted after {} frames, {samples} samples written", reader.consumed()));
+        }
+        report(
+            job,
+            TrackedReport { interrupted, warnings, ..TrackedReport::new(samples, rate, 0.0, quality) },
+        )
+    }
+
+    fn write(&mut self, samples: &[f64]) -> Result<(), Failure> {
+        let format = self.job.format;
+        let mut bytes = vec![0; samples.len() * format.bytes()];
+        for (slot, x) in bytes.chunks_exact_mut(format.bytes()).zip(samples) {
+            self.clipped += u64::from(format.encode(*x, slot));
+        }
+        self.samples += samples.len();
+        self.outputs.write(Block { samples: &bytes, mask: None }).map_err(stopped)
+    }
+}
+
+/// The samples of all channels, as many of each.
+fn channels(recordings: &[RecordedFrames<'_>]) -> Vec<Vec<f64>> {
+    let frames = frames_of(recordings) as usize;
+    let mut channels = Vec::new();
+    for RecordedFrames { real, .. } in recordings {
+        channels.extend((0..real.channels()).map(|channel| real.channel(channel).take(frames).collect()));
+    }
+    channels
 }
 
 /// Fuses tables whose samples have stamps.
@@ -108,19 +197,15 @@ pub(super) fn fuse_stamps(job: &BankRun<'_>, inputs: &[PathBuf], format: &FileFo
         MergeError::Design(_) => failed_at(job.bank_path, error),
         error => failed(error),
     })?;
-    write(job, &tracked, 1.0 / job.bank.fast_period.0, Vec::new())
-}
-
-/// Writes what was fused, and reports it.
-fn write(job: &BankRun<'_>, tracked: &Tracked, rate: f64, warnings: Vec<String>) -> Result<(), Failure> {
-    let samples = &tracked.samples;
+    let (samples, rate) = (&tracked.samples, 1.0 / job.bank.fast_period.0);
     let mono = Mono { samples, imaginary: None, rate, format: job.format, container: job.container };
     let files = begin_recording(job.output, mono, job.args.force)?;
-    let warnings: Vec<String> = warnings.into_iter().chain(mono.clipped()).collect();
+    let warnings: Vec<String> = mono.clipped().into_iter().collect();
     check_strict(&warnings, job.args.strict)?;
     commit_all(files).map_err(failed)?;
     warnings.iter().for_each(|text| warn(text));
-    report(job, tracked, rate, warnings)
+    let report_of = TrackedReport::new(samples.len(), rate, tracked.begin.0, tracked.quality);
+    report(job, TrackedReport { warnings, ..report_of })
 }
 
 /// Reads the table of delays: lines of JSON as `align` writes them, or a table with headings.
@@ -164,16 +249,22 @@ fn read_lines(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
     Ok(DelayTrack { times, delays })
 }
 
-fn report(job: &BankRun<'_>, tracked: &Tracked, rate: f64, warnings: Vec<String>) -> Result<(), Failure> {
-    let report = TrackedReport {
-        samples: tracked.samples.len(),
-        rate,
-        begin: tracked.begin.0,
-        predicted_snr_db: tracked.snr.0,
-        worst_second_db: tracked.worst_second.0,
-        worst_second_at: tracked.worst_at.0,
-        warnings,
-    };
+impl TrackedReport {
+    fn new(samples: usize, rate: f64, begin: f64, quality: PredictedQuality) -> Self {
+        Self {
+            samples,
+            rate,
+            begin,
+            predicted_snr_db: quality.snr.0,
+            worst_second_db: quality.worst_second.0,
+            worst_second_at: quality.worst_at.0,
+            interrupted: false,
+            warnings: Vec::new(),
+        }
+    }
+}
+
+fn report(job: &BankRun<'_>, report: TrackedReport) -> Result<(), Failure> {
     if job.args.json {
         return print_report(&report, job.output);
     }
@@ -184,7 +275,7 @@ fn report(job: &BankRun<'_>, tracked: &Tracked, rate: f64, warnings: Vec<String>
         "{}: {} at {}, predicted SNR {:.1} dB, {:.1} dB in the worst second ({:.1} s after the beginning)\n",
         Quoted(job.output),
         counted(report.samples, "sample"),
-        readable(rate, "S/s"),
+        readable(report.rate, "S/s"),
         report.predicted_snr_db,
         report.worst_second_db,
         report.worst_second_at

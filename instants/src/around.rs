@@ -30,7 +30,7 @@ impl Around {
             for number in recording.around(instants.clone(), reach, within) {
                 let sample = recording.sample(number as i64);
                 samples.push(TimedSample { instant: sample.instant - instants.start, ..sample });
-                values.push(recording.samples()[number]);
+                values.push(recording.value(number));
             }
             places.push(begin..samples.len());
         }

@@ -1,27 +1,36 @@
 //! A covariance as a function of the time between two samples.
 
-use hybank_linalg::Complex;
-use std::f64::consts::TAU;
+use hybank_linalg::{Complex, Mat};
+use std::f64::consts::{PI, TAU};
 
 /// Points of the table per period of the highest frequency. Interpolation by twelve points errs by 2e-15 of
 /// the power there.
 const POINTS_PER_PERIOD: f64 = 48.0;
 /// Points of an interpolation, half of them on each side.
 const ORDER: usize = 12;
-/// Steps after which a phasor is computed again, so that products do not collect rounding errors.
-const RENEWAL: usize = 256;
-/// Terms that are summed side by side.
-const LANES: usize = 8;
+/// Coefficients of the polynomial between two points: 64 bytes, a line of the cache. In place of the
+/// interpolation it errs by 1e-16 of the power.
+const COEFFICIENTS: usize = 8;
+/// Values from one time for which phasors are computed to the next; those between are turned, so that
+/// products do not collect rounding errors.
+const RENEWAL: usize = 128;
+/// Terms that are summed at a time, for the sake of memory.
+const TERMS: usize = 512;
 
-/// `c(t) = sum_q p_q Re(z_q e^{2 pi j f_q t})` for |t| up to a limit, tabulated.
+/// `c(t) = sum_q p_q Re(z_q e^{2 pi j f_q t})` for |t| up to a limit, as polynomials between points of time.
 #[derive(Debug, Clone)]
 pub(super) struct Covariance {
-    /// Time of the first value.
+    /// Time of the first polynomial.
     first: f64,
-    /// Values per unit of time.
+    /// Polynomials per unit of time.
     density: f64,
-    values: Vec<f64>,
+    polynomials: Vec<Polynomial>,
 }
+
+/// Coefficients of the powers of x from -1 to 1, from the lowest on.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+struct Polynomial([f64; COEFFICIENTS]);
 
 /// A term of a covariance.
 #[derive(Debug, Clone, Copy)]
@@ -42,18 +51,14 @@ impl Covariance {
         let first = -(half as f64) / density;
         let is_even = terms.iter().all(|term| term.amplitude.im == 0.0);
         let begin = if is_even { half } else { 0 };
-        let mut values = vec![0.0; 2 * half + 1];
-        for group in terms.chunks(LANES) {
-            let turns = Turns::new(group, 1.0 / density);
-            for (number, chunk) in values[begin..].chunks_mut(RENEWAL).enumerate() {
-                let start = first + (begin + number * RENEWAL) as f64 / density;
-                turns.add(group, start, chunk);
-            }
-        }
+        let mut values = sums(terms, first + begin as f64 / density, 1.0 / density, 2 * half + 1 - begin);
+        values.splice(0..0, std::iter::repeat_n(0.0, begin));
         for k in 0..begin {
             values[k] = values[2 * half - k];
         }
-        Self { first, density, values }
+        let economy = Economy::new();
+        let polynomials = values.windows(ORDER).map(|values| economy.polynomial(values)).collect();
+        Self { first: first + (ORDER / 2 - 1) as f64 / density, density, polynomials }
     }
 
     /// c(t).
@@ -62,44 +67,73 @@ impl Covariance {
     /// For times beyond the limit.
     pub(super) fn at(&self, t: f64) -> f64 {
         let place = (t - self.first) * self.density;
-        let start = place.floor() as usize - (ORDER / 2 - 1);
-        let part = place - place.floor();
-        let values = &self.values[start..start + ORDER];
-        values.iter().zip(lagrange(part)).map(|(value, weight)| value * weight).sum()
+        // Below 0 it is the largest number.
+        let number = place as i64 as usize;
+        let x = 2.0 * (place - number as f64) - 1.0;
+        let [a, b, c, d, e, f, g, h] = self.polynomials[number].0;
+        let (square, fourth) = (x * x, x * x * x * x);
+        (a + b * x) + (c + d * x) * square + ((e + f * x) + (g + h * x) * square) * fourth
     }
 }
 
-/// What some terms turn by from value to value. Their products do not wait for one another.
-struct Turns {
-    cosines: [f64; LANES],
-    sines: [f64; LANES],
-}
+/// From twelve values to the polynomial of eight coefficients that meets their interpolation at eight
+/// Chebyshev points between the middle ones.
+struct Economy([[f64; ORDER]; COEFFICIENTS]);
 
-impl Turns {
-    fn new(terms: &[Term], step: f64) -> Self {
-        let (mut cosines, mut sines) = ([0.0; LANES], [0.0; LANES]);
-        for (lane, term) in terms.iter().enumerate() {
-            (sines[lane], cosines[lane]) = (TAU * term.frequency * step).sin_cos();
+impl Economy {
+    fn new() -> Self {
+        let angle = |k: usize| PI * (k as f64 + 0.5) / COEFFICIENTS as f64;
+        let weights: Vec<[f64; ORDER]> =
+            (0..COEFFICIENTS).map(|k| lagrange(0.5 + 0.5 * angle(k).cos())).collect();
+        let mut coefficients = [[0.0; ORDER]; COEFFICIENTS];
+        // T_n and the one before it.
+        let (mut now, mut before) = ([0.0; COEFFICIENTS], [0.0; COEFFICIENTS]);
+        now[0] = 1.0;
+        for n in 0..COEFFICIENTS {
+            let norm = if n == 0 { 1.0 } else { 2.0 } / COEFFICIENTS as f64;
+            for (k, weights) in weights.iter().enumerate() {
+                let at = norm * (n as f64 * angle(k)).cos();
+                for (row, power) in coefficients.iter_mut().zip(now) {
+                    row.iter_mut().zip(weights).for_each(|(entry, weight)| *entry += power * at * weight);
+                }
+            }
+            let factor = if n == 0 { 1.0 } else { 2.0 };
+            let next: [f64; COEFFICIENTS] = std::array::from_fn(|power| {
+                factor * if power == 0 { 0.0 } else { now[power - 1] } - before[power]
+            });
+            (before, now) = (now, next);
         }
-        Self { cosines, sines }
+        Self(coefficients)
     }
 
-    /// Adds the sum of the terms, whose turns these are, from a time on.
-    fn add(&self, terms: &[Term], start: f64, values: &mut [f64]) {
-        let (mut real, mut imaginary) = ([0.0; LANES], [0.0; LANES]);
-        for (lane, term) in terms.iter().enumerate() {
-            let phasor = term.amplitude * Complex::from_polar(1.0, TAU * term.frequency * start);
-            (real[lane], imaginary[lane]) = (phasor.re, phasor.im);
-        }
-        for value in values {
-            *value += real.iter().sum::<f64>();
-            for lane in 0..LANES {
-                let (re, im) = (real[lane], imaginary[lane]);
-                real[lane] = re * self.cosines[lane] - im * self.sines[lane];
-                imaginary[lane] = re * self.sines[lane] + im * self.cosines[lane];
+    fn polynomial(&self, values: &[f64]) -> Polynomial {
+        Polynomial(self.0.map(|row| row.iter().zip(values).map(|(weight, value)| weight * value).sum()))
+    }
+}
+
+/// The sums of terms at `count` times. A time is one of few and a step of few more, and a term the product of
+/// two phasors, so the sums are products of matrices.
+fn sums(terms: &[Term], first: f64, step: f64, count: usize) -> Vec<f64> {
+    let begins: Vec<f64> = (0..count).step_by(RENEWAL).map(|n| first + n as f64 * step).collect();
+    let mut values = Mat::zeros(RENEWAL, begins.len());
+    for terms in terms.chunks(TERMS) {
+        let mut turns = Mat::zeros(RENEWAL, 2 * terms.len());
+        for (q, Term { frequency, .. }) in terms.iter().enumerate() {
+            let turn = Complex::from_polar(1.0, TAU * frequency * step);
+            let mut turned = Complex::from(1.0);
+            for n in 0..RENEWAL {
+                (turns[(n, 2 * q)], turns[(n, 2 * q + 1)]) = (turned.re, -turned.im);
+                turned *= turn;
             }
         }
+        let phasor = |row: usize, begin: usize| {
+            let Term { frequency, amplitude } = terms[row / 2];
+            let phasor = amplitude * Complex::from_polar(1.0, TAU * frequency * begins[begin]);
+            if row % 2 == 0 { phasor.re } else { phasor.im }
+        };
+        values.gemm(1.0, &turns, &Mat::from_fn(2 * terms.len(), begins.len(), phasor), 1.0);
     }
+    values.as_slice()[..count].to_vec()
 }
 
 /// The weights of the values at -5, -4, .., 6 for the polynomial through them at x in [0, 1).

@@ -18,6 +18,11 @@ pub(super) struct Outputs {
     pub(super) error: MeanSquare,
 }
 
+/// How far from the outputs of a block samples may lie.
+pub(super) fn within(estimator: &Estimator) -> FastPeriods {
+    (estimator.signals().longest() - LONGEST_BLOCK) * 0.5
+}
+
 /// The target at ascending `instants`, from the samples between them and `reach` more of each recording on
 /// either side.
 ///
@@ -34,7 +39,7 @@ pub(super) fn outputs(
     let (Some(&origin), Some(&end)) = (instants.first(), instants.last()) else {
         return Ok(Outputs { outputs: Vec::new(), error: MeanSquare { signal: 0.0, noise: 0.0 } });
     };
-    let within = (estimator.signals().longest() - LONGEST_BLOCK) * 0.5;
+    let within = within(estimator);
     let Around { samples, values, .. } = Around::new(recordings, origin..end, reach, within);
     if samples.is_empty() {
         let error = MeanSquare { signal: 1.0, noise: 0.0 };

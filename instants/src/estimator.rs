@@ -91,10 +91,16 @@ impl Estimator {
     /// The covariances of some samples among one another without noise, the lower triangle.
     pub(super) fn signal_covariances(&self, samples: &[TimedSample]) -> Mat {
         let mut among = Mat::zeros(samples.len(), samples.len());
+        let is_one = |one: &TimedSample, other: &TimedSample| one.converter == other.converter;
         for (l, second) in samples.iter().enumerate() {
-            for (k, first) in samples.iter().enumerate().skip(l) {
-                let later = (first.instant - second.instant).0;
-                among[(k, l)] = self.signals.of_samples(first.converter, second.converter, later);
+            let mut column = &mut among.as_mut_slice()[l * samples.len() + l..];
+            for run in samples[l..].chunk_by(is_one) {
+                let covariances = self.signals.of_samples(run[0].converter, second.converter);
+                let (entries, rest) = column.split_at_mut(run.len());
+                for (entry, first) in entries.iter_mut().zip(run) {
+                    *entry = covariances.at((first.instant - second.instant).0);
+                }
+                column = rest;
             }
         }
         among
@@ -129,7 +135,7 @@ impl SampleSet<'_> {
     pub fn with_target(&self, instants: &[FastPeriods]) -> Mat {
         Mat::from_fn(self.samples.len(), instants.len(), |k, column| {
             let TimedSample { converter, instant } = self.samples[k];
-            self.signals.of_target(converter, (instant - instants[column]).0)
+            self.signals.of_target(converter).at((instant - instants[column]).0)
         })
     }
 

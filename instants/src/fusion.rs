@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Frames of a block, for which one error is stated.
-const FRAMES_PER_BLOCK: usize = 64;
+pub(super) const FRAMES_PER_BLOCK: usize = 64;
 /// Outputs that share a set of samples where instants have no pattern.
 const OUTPUTS_OF_SET: usize = 64;
 /// Most blocks of a stretch, whose frames share the numbers of their samples.
@@ -55,7 +55,7 @@ pub struct Fused {
 /// The outputs, in frames of as many as a recorder has fast periods in each of its own.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OutputGrid {
-    first: FastPeriods,
+    pub(super) first: FastPeriods,
     pub(super) ratio: usize,
 }
 
@@ -77,12 +77,6 @@ impl OutputGrid {
     }
 }
 
-/// Outputs of a stretch, and the errors of its blocks.
-struct Part {
-    outputs: Vec<f64>,
-    errors: Vec<MeanSquare>,
-}
-
 /// Estimates the target at every output of a grid.
 ///
 /// Recorders of nearly one rate, that of an integer number of fast periods, share taps over many frames. For
@@ -98,77 +92,108 @@ pub fn fuse(
     recordings: &[Recording],
     settings: FusionSettings,
 ) -> Result<Fused, LinalgError> {
-    let FusionSettings { first, count, reach } = settings;
-    let longest = estimator.signals().longest();
-    let common = common_ratio(recordings).filter(|ratio| ((2 * reach + 2) * ratio) as f64 <= longest.0);
-    let grid = OutputGrid { first, ratio: common.unwrap_or(1) };
-    let fusion = KnownInstantFusion { estimator, recordings, grid, reach };
-    let frames = count.div_ceil(grid.ratio);
-    let length = FRAMES_PER_BLOCK * common.map_or(1, |ratio| blocks_of_stretch(recordings, ratio));
-    let stretch = |number: usize| {
-        let frames = number * length..frames.min((number + 1) * length);
-        let is_even =
-            common.is_some() && recordings.iter().all(|recording| fusion.is_even(recording, &frames));
-        if is_even { fusion.on_knots(frames) } else { fusion.on_demand(frames) }
+    let layout = Layout::new(estimator, recordings, settings);
+    let fusion = KnownInstantFusion { estimator, recordings, layout };
+    let frames = settings.count.div_ceil(layout.grid.ratio);
+    let part = |number: usize| {
+        let frames = number * layout.length..frames.min((number + 1) * layout.length);
+        let stretch = fusion.stretch(frames.clone())?;
+        let starts = frames.clone().step_by(FRAMES_PER_BLOCK);
+        starts
+            .map(|start| fusion.block(stretch.as_ref(), start..frames.end.min(start + FRAMES_PER_BLOCK)))
+            .collect::<Result<Vec<Outputs>, _>>()
     };
-    let parts: Vec<Part> =
-        (0..frames.div_ceil(length)).into_par_iter().map(stretch).collect::<Result<_, _>>()?;
-    let (mut samples, mut errors) = (Vec::with_capacity(frames * grid.ratio), Vec::new());
-    for part in parts {
-        samples.extend(part.outputs);
-        errors.extend(part.errors);
+    let parts =
+        (0..frames.div_ceil(layout.length)).into_par_iter().map(part).collect::<Result<Vec<_>, _>>()?;
+    let mut fused = layout.fused(parts.into_iter().flatten());
+    fused.samples.truncate(settings.count);
+    Ok(fused)
+}
+
+/// How the outputs of a run are made.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Layout {
+    pub(super) grid: OutputGrid,
+    /// Samples of each recording on either side.
+    pub(super) reach: usize,
+    /// Frames of a stretch.
+    pub(super) length: usize,
+    /// Whether all recorders have nearly the rate of the frames.
+    is_common: bool,
+}
+
+impl Layout {
+    pub(super) fn new(estimator: &Estimator, recordings: &[Recording], settings: FusionSettings) -> Self {
+        let FusionSettings { first, reach, .. } = settings;
+        let longest = estimator.signals().longest();
+        let common = common_ratio(recordings).filter(|ratio| ((2 * reach + 2) * ratio) as f64 <= longest.0);
+        let length = FRAMES_PER_BLOCK * common.map_or(1, |ratio| blocks_of_stretch(recordings, ratio));
+        let grid = OutputGrid { first, ratio: common.unwrap_or(1) };
+        Self { grid, reach, length, is_common: common.is_some() }
     }
-    samples.truncate(count);
-    Ok(Fused { samples, errors, block: FRAMES_PER_BLOCK * grid.ratio })
+
+    /// What blocks are together.
+    pub(super) fn fused(self, blocks: impl Iterator<Item = Outputs>) -> Fused {
+        let mut fused =
+            Fused { samples: Vec::new(), errors: Vec::new(), block: FRAMES_PER_BLOCK * self.grid.ratio };
+        for block in blocks {
+            fused.samples.extend(block.outputs);
+            fused.errors.push(block.error);
+        }
+        fused
+    }
 }
 
 /// What all stretches of a run share.
-struct KnownInstantFusion<'a> {
-    estimator: &'a Estimator,
-    recordings: &'a [Recording],
-    grid: OutputGrid,
-    reach: usize,
+pub(super) struct KnownInstantFusion<'a> {
+    pub(super) estimator: &'a Estimator,
+    pub(super) recordings: &'a [Recording],
+    pub(super) layout: Layout,
 }
 
 impl KnownInstantFusion<'_> {
+    /// The taps of a stretch; `None` if its samples do not come at nearly the common rate. Only the clocks of
+    /// the recordings matter.
+    pub(super) fn stretch(&self, frames: Range<usize>) -> Result<Option<Stretch>, LinalgError> {
+        let is_even = |recording: &Recording| self.is_even(recording, &frames);
+        let has_pattern = self.layout.is_common && self.recordings.iter().all(is_even);
+        has_pattern.then(|| Stretch::new(self, frames)).transpose()
+    }
+
     /// Whether the samples around these frames come at nearly the common rate.
     fn is_even(&self, recording: &Recording, frames: &Range<usize>) -> bool {
-        let clock = recording.clock();
-        let [first, last] = [frames.start, frames.end].map(|frame| clock.sample_at(self.grid.frame(frame)));
-        let reach = (self.reach + 1) as f64;
-        clock.periods(first - reach..last + reach).all(|period| is_near(period, self.grid.ratio))
+        let (clock, grid) = (recording.clock(), self.layout.grid);
+        let [first, last] = [frames.start, frames.end].map(|frame| clock.sample_at(grid.frame(frame)));
+        let reach = (self.layout.reach + 1) as f64;
+        clock.periods(first - reach..last + reach).all(|period| is_near(period, grid.ratio))
     }
 
-    fn on_knots(&self, frames: Range<usize>) -> Result<Part, LinalgError> {
-        let Self { estimator, recordings, grid, reach } = *self;
-        let stretch = Stretch::new(estimator, recordings, grid, reach, frames.clone())?;
-        let (mut outputs, mut errors) = (Vec::with_capacity(frames.len() * grid.ratio), Vec::new());
-        for (frame, found) in stretch.frames() {
-            let found = match found {
-                Some(found) => found,
-                None => self.of_set(&grid.instants(frame..frame + 1))?,
-            };
-            outputs.extend(found.outputs);
-            errors.push(found.error);
-        }
-        let errors = errors.chunks(FRAMES_PER_BLOCK).map(MeanSquare::mean).collect();
-        Ok(Part { outputs, errors })
-    }
-
-    fn on_demand(&self, frames: Range<usize>) -> Result<Part, LinalgError> {
-        let Self { grid, .. } = *self;
-        let (mut outputs, mut errors) = (Vec::with_capacity(frames.len() * grid.ratio), Vec::new());
-        for block in grid.instants(frames).chunks(FRAMES_PER_BLOCK * grid.ratio) {
-            let parts = block.chunks(OUTPUTS_OF_SET).map(|part| self.of_set(part));
-            let parts = parts.collect::<Result<Vec<_>, _>>()?;
-            errors.push(MeanSquare::mean(&parts.iter().map(|part| part.error).collect::<Vec<_>>()));
-            outputs.extend(parts.into_iter().flat_map(|part| part.outputs));
-        }
-        Ok(Part { outputs, errors })
+    /// The outputs of the frames of a block, by the taps of its stretch.
+    pub(super) fn block(
+        &self,
+        stretch: Option<&Stretch>,
+        frames: Range<usize>,
+    ) -> Result<Outputs, LinalgError> {
+        let grid = self.layout.grid;
+        let parts = match stretch {
+            Some(stretch) => frames
+                .map(|frame| match stretch.frame(self.recordings, frame) {
+                    Some(found) => Ok(found),
+                    None => self.of_set(&grid.instants(frame..frame + 1)),
+                })
+                .collect::<Result<Vec<_>, _>>()?,
+            None => grid
+                .instants(frames)
+                .chunks(OUTPUTS_OF_SET)
+                .map(|part| self.of_set(part))
+                .collect::<Result<_, _>>()?,
+        };
+        let error = MeanSquare::mean(&parts.iter().map(|part| part.error).collect::<Vec<_>>());
+        Ok(Outputs { outputs: parts.into_iter().flat_map(|part| part.outputs).collect(), error })
     }
 
     fn of_set(&self, instants: &[FastPeriods]) -> Result<Outputs, LinalgError> {
-        demand::outputs(self.estimator, self.recordings, self.reach, instants)
+        demand::outputs(self.estimator, self.recordings, self.layout.reach, instants)
     }
 }
 

@@ -1,14 +1,15 @@
-//! Recorders of nearly one rate: taps for the instants at knots of time, and lines between them.
+//! Recorders of nearly one rate: taps for the instants at knots of time, and curves between them.
 //!
 //! From frame to frame the samples move along with the outputs, only their offsets drift. So a set of taps
-//! serves for many frames, and between two knots the taps are on lines. Knots lie at absolute frames, dense
-//! where taps change fast: an interval is halved as long as a line through its ends is worse in its middle
-//! than the best taps there, or two recorders sample at one instant within it. There taps change sign within
-//! a ten thousandth of a period, which no look at the middle would find.
+//! serves for many frames, and between knots the taps are on parabolas. Knots lie at absolute frames, dense
+//! where taps change fast: an interval is halved as long as a curve through its ends and the knot beside it is
+//! worse in its middle than the best taps there, or the samples next to an output are at one instant
+//! within it. There taps change sign within a ten thousandth of a period, which no look at the middle would
+//! find.
 
 use super::demand::Outputs;
-use super::estimator::{Estimator, EstimatorTaps, MeanSquare, TimedSample};
-use super::fusion::OutputGrid;
+use super::estimator::{EstimatorTaps, MeanSquare, TimedSample};
+use super::fusion::KnownInstantFusion;
 use super::recording::Recording;
 use hybank_core::units::FastPeriods;
 use hybank_linalg::{LinalgError, Mat, dot};
@@ -21,44 +22,50 @@ const MOST_LOSS: f64 = 1.023_292_992_280_754;
 const STANDSTILL: f64 = 1e-9;
 
 /// Taps for the frames of one stretch.
-pub(super) struct Stretch<'a> {
-    estimator: &'a Estimator,
-    recordings: &'a [Recording],
-    grid: OutputGrid,
-    /// Samples of each recording on either side.
-    reach: usize,
+#[derive(Debug)]
+pub(super) struct Stretch {
     /// The first of the samples of each recording for frame 0; it need not be there.
     starts: Vec<i64>,
+    /// Samples of each recording for a frame.
+    count: usize,
     /// Ascending by frame.
     knots: Vec<Knot>,
+    /// Ascending by frame, each up to the next one.
+    curves: Vec<Curve>,
+}
+
+/// Taps of the frames from one knot on, on a curve through this and the next ones.
+#[derive(Debug, Clone, Copy)]
+struct Curve {
+    /// The number of the first knot.
+    first: usize,
+    /// How many.
+    count: usize,
 }
 
 /// The best taps of a frame.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 struct Knot {
     frame: usize,
     taps: EstimatorTaps,
 }
 
-impl<'a> Stretch<'a> {
+impl Stretch {
     /// For these frames, over which no sample drifts by more than a fraction of its period.
     ///
     /// # Errors
     /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
-    pub(super) fn new(
-        estimator: &'a Estimator,
-        recordings: &'a [Recording],
-        grid: OutputGrid,
-        reach: usize,
-        frames: Range<usize>,
-    ) -> Result<Self, LinalgError> {
+    pub(super) fn new(fusion: &KnownInstantFusion<'_>, frames: Range<usize>) -> Result<Self, LinalgError> {
+        let (grid, reach) = (fusion.layout.grid, fusion.layout.reach);
         let middle = frames.start.midpoint(frames.end);
         let centre = grid.frame(middle) + FastPeriods(0.5 * (grid.ratio - 1) as f64);
         let start = |recording: &Recording| recording.nearest(centre) - middle as i64 - reach as i64 + 1;
-        let starts = recordings.iter().map(start).collect();
-        let mut stretch = Self { estimator, recordings, grid, reach, starts, knots: Vec::new() };
-        let (first, last) = (stretch.knot(frames.start)?, stretch.knot(frames.end)?);
-        stretch.refine(first, last.clone())?;
+        let starts = fusion.recordings.iter().map(start).collect();
+        let stretch = Self { starts, count: 2 * reach, knots: Vec::new(), curves: Vec::new() };
+        let mut refinement = Refinement { fusion, stretch };
+        let (first, last) = (refinement.knot(frames.start)?, refinement.knot(frames.end)?);
+        refinement.refine(first, last.clone(), None)?;
+        let mut stretch = refinement.stretch;
         stretch.knots.push(last);
         Ok(stretch)
     }
@@ -66,90 +73,103 @@ impl<'a> Stretch<'a> {
     /// The samples of the recording `i` for a frame.
     fn numbers(&self, i: usize, frame: usize) -> Range<i64> {
         let start = self.starts[i] + frame as i64;
-        start..start + 2 * self.reach as i64
+        start..start + self.count as i64
     }
 
+    /// The outputs of a frame of the stretch; `None` where a sample is not there.
+    pub(super) fn frame(&self, recordings: &[Recording], frame: usize) -> Option<Outputs> {
+        let after = self.curves.partition_point(|curve| self.knots[curve.first].frame <= frame).max(1);
+        let Curve { first, count } = self.curves[after - 1];
+        let knots: Vec<&Knot> = self.knots[first..first + count].iter().collect();
+        let all = recordings.iter().enumerate();
+        let slices: Vec<&[f64]> =
+            all.map(|(i, recording)| recording.whole(self.numbers(i, frame))).collect::<Option<_>>()?;
+        let shares = shares(&knots, frame);
+        let output = |p: usize| {
+            knots.iter().zip(&shares).map(|(knot, share)| share * knot.output(p, &slices)).sum::<f64>()
+        };
+        let outputs = (0..knots[0].taps.weights.ncols()).map(output).collect();
+        let right = knots.partition_point(|knot| knot.frame <= frame).clamp(1, count - 1);
+        Some(Outputs { outputs, error: between(knots[right - 1], knots[right], frame) })
+    }
+}
+
+/// A stretch whose knots are being made.
+struct Refinement<'a> {
+    fusion: &'a KnownInstantFusion<'a>,
+    stretch: Stretch,
+}
+
+impl Refinement<'_> {
     /// All samples for a frame, with instants relative to it.
     fn samples(&self, frame: usize) -> Vec<TimedSample> {
-        let origin = self.grid.frame(frame);
-        let of = |i: usize| {
-            self.numbers(i, frame).map(move |number| {
-                let sample = self.recordings[i].sample(number);
-                TimedSample { instant: sample.instant - origin, ..sample }
-            })
+        let origin = self.fusion.layout.grid.frame(frame);
+        let of = |(i, recording): (usize, &'_ Recording)| {
+            self.stretch
+                .numbers(i, frame)
+                .map(|number| {
+                    let sample = recording.sample(number);
+                    TimedSample { instant: sample.instant - origin, ..sample }
+                })
+                .collect::<Vec<_>>()
         };
-        (0..self.recordings.len()).flat_map(of).collect()
+        self.fusion.recordings.iter().enumerate().flat_map(of).collect()
     }
 
     fn knot(&self, frame: usize) -> Result<Knot, LinalgError> {
-        Ok(Knot { frame, taps: self.estimator.taps(&self.samples(frame), &self.grid.phases())? })
+        let phases = self.fusion.layout.grid.phases();
+        Ok(Knot { frame, taps: self.fusion.estimator.taps(&self.samples(frame), &phases)? })
     }
 
-    /// Adds `left` and the knots between it and `right`.
-    fn refine(&mut self, left: Knot, right: Knot) -> Result<(), LinalgError> {
+    /// Adds `left` and the knots between it and `right`; `beside` is another one near to both, without a
+    /// coincidence between them.
+    fn refine(&mut self, left: Knot, right: Knot, beside: Option<&Knot>) -> Result<(), LinalgError> {
         if right.frame - left.frame < 2 {
-            self.knots.push(left);
+            self.add([left]);
             return Ok(());
         }
         let frame = left.frame.midpoint(right.frame);
         if self.has_coincidence(left.frame, right.frame) {
             let middle = self.knot(frame)?;
-            self.refine(left, middle.clone())?;
-            return self.refine(middle, right);
+            self.refine(left, middle.clone(), None)?;
+            return self.refine(middle, right, None);
         }
         let samples = self.samples(frame);
-        let set = self.estimator.set(&samples);
-        let with_target = set.with_target(&self.grid.phases());
+        let set = self.fusion.estimator.set(&samples);
+        let with_target = set.with_target(&self.fusion.layout.grid.phases());
         let middle = Knot { frame, taps: set.taps(&with_target)? };
-        let on_line = set.errors(&halfway(&left, &right), &with_target);
-        let mut pairs = on_line.iter().zip(&middle.taps.errors);
-        if pairs.all(|(line, best)| line.total() <= MOST_LOSS * best.total()) {
-            self.knots.extend([left, middle]);
+        let known: Vec<&Knot> = [&left, &right].into_iter().chain(beside).collect();
+        let on_curve = set.errors(&combined(&known, frame), &with_target);
+        let mut pairs = on_curve.iter().zip(&middle.taps.errors);
+        if pairs.all(|(curve, best)| curve.total() <= MOST_LOSS * best.total()) {
+            self.add([left, middle]);
             return Ok(());
         }
-        self.refine(left, middle.clone())?;
-        self.refine(middle, right)
+        self.refine(left.clone(), middle.clone(), Some(&right))?;
+        self.refine(middle, right, Some(&left))
     }
 
-    /// Whether two recorders sample at one instant between two frames.
+    /// Adds knots whose curve goes on to the knot that comes next.
+    fn add<const COUNT: usize>(&mut self, knots: [Knot; COUNT]) {
+        let Stretch { knots: all, curves, .. } = &mut self.stretch;
+        curves.push(Curve { first: all.len(), count: COUNT + 1 });
+        all.extend(knots);
+    }
+
+    /// Whether two recorders sample at one instant, in the middle of their samples, between two frames.
     fn has_coincidence(&self, first: usize, last: usize) -> bool {
+        let recordings = self.fusion.recordings;
         let place = |i: usize, j: usize, frame: usize| {
-            let number = self.starts[i] + frame as i64;
-            let instant = self.recordings[i].clock().at(number as f64);
-            self.recordings[j].clock().sample_at(instant) - frame as f64
+            let Range { start, end } = self.stretch.numbers(i, frame);
+            let instant = recordings[i].clock().at(0.5 * (start + end) as f64);
+            recordings[j].clock().sample_at(instant) - frame as f64
         };
         let meet = |i: usize, j: usize| {
             let [before, after] = [first, last].map(|frame| place(i, j, frame));
             before.floor() != after.floor() && (after - before).abs() > STANDSTILL
         };
-        let count = self.recordings.len();
+        let count = recordings.len();
         (0..count).any(|i| (0..i).any(|j| meet(i, j)))
-    }
-
-    /// The outputs of all frames, in their order; `None` where a sample is not there.
-    pub(super) fn frames(&self) -> impl Iterator<Item = (usize, Option<Outputs>)> {
-        self.knots.windows(2).flat_map(move |pair| {
-            let [left, right] = [&pair[0], &pair[1]];
-            (left.frame..right.frame).map(move |frame| (frame, self.frame(left, right, frame)))
-        })
-    }
-
-    fn frame(&self, left: &Knot, right: &Knot, frame: usize) -> Option<Outputs> {
-        let numbers: Vec<Range<i64>> = (0..self.recordings.len()).map(|i| self.numbers(i, frame)).collect();
-        if self.recordings.iter().zip(&numbers).any(|(recording, samples)| !recording.is_whole(samples)) {
-            return None;
-        }
-        let slice = |(recording, numbers): (&'a Recording, &Range<i64>)| {
-            &recording.samples()[numbers.start as usize..numbers.end as usize]
-        };
-        let slices: Vec<&[f64]> = self.recordings.iter().zip(&numbers).map(slice).collect();
-        let part = (frame - left.frame) as f64 / (right.frame - left.frame) as f64;
-        let between = |x: f64, y: f64| x + part * (y - x);
-        let output = |p: usize| between(left.output(p, &slices), right.output(p, &slices));
-        let [first, second] = [left, right].map(|knot| MeanSquare::mean(&knot.taps.errors));
-        let signal = between(first.signal, second.signal);
-        let error = MeanSquare { signal, noise: between(first.noise, second.noise) };
-        Some(Outputs { outputs: (0..self.grid.ratio).map(output).collect(), error })
     }
 }
 
@@ -163,6 +183,27 @@ impl Knot {
     }
 }
 
-fn halfway(left: &Knot, right: &Knot) -> Mat {
-    (&left.taps.weights + &right.taps.weights) * 0.5
+/// The shares of knots in the taps of a frame on the curve through them.
+fn shares(knots: &[&Knot], frame: usize) -> Vec<f64> {
+    let share = |knot: &&Knot| {
+        let others = knots.iter().filter(|other| other.frame != knot.frame);
+        let factor =
+            |other: &&Knot| (frame as f64 - other.frame as f64) / (knot.frame as f64 - other.frame as f64);
+        others.map(factor).product()
+    };
+    knots.iter().map(share).collect()
+}
+
+/// The taps of a frame on the curve through knots.
+fn combined(knots: &[&Knot], frame: usize) -> Mat {
+    let parts = knots.iter().zip(shares(knots, frame)).map(|(knot, share)| &knot.taps.weights * share);
+    parts.reduce(|sum, part| sum + part).unwrap_or_default()
+}
+
+/// The error at a frame, on a line between those of two knots.
+fn between(left: &Knot, right: &Knot, frame: usize) -> MeanSquare {
+    let [first, second] = [left, right].map(|knot| MeanSquare::mean(&knot.taps.errors));
+    let part = (frame - left.frame) as f64 / (right.frame - left.frame) as f64;
+    let on_line = |x: f64, y: f64| x + part * (y - x);
+    MeanSquare { signal: on_line(first.signal, second.signal), noise: on_line(first.noise, second.noise) }
 }

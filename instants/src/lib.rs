@@ -30,6 +30,7 @@ mod fusion;
 mod heldout;
 mod knots;
 mod learned;
+mod live;
 mod model;
 mod noise;
 mod recording;
@@ -41,6 +42,7 @@ pub use estimator::{Estimator, EstimatorTaps, MeanSquare, SampleSet, TimedSample
 pub use fusion::{Fused, FusionSettings, fuse};
 pub use heldout::{HeldOut, Trials};
 pub use learned::learned;
+pub use live::LiveFusion;
 pub use model::{Model, Prior};
 pub use recording::Recording;
 pub use signals::{Converter, Signals};

@@ -12,7 +12,7 @@ use hybank_core::units::{CyclesPerFastPeriod, FastPeriods};
 use hybank_linalg::{Complex, LinalgError};
 
 /// Parts of the run from which the spectrum is learned, and outputs of each.
-const PARTS: usize = 128;
+const PARTS: usize = 64;
 const OUTPUTS_OF_PART: usize = 2048;
 /// Instants at which samples are left out, to measure the noise.
 pub(super) const TRIALS: usize = 64;

@@ -142,21 +142,37 @@ impl Signals {
         self.longest
     }
 
-    /// The covariance of a sample of converter `i` and one of converter `k` taken `later` before it, without
-    /// noise.
-    pub(super) fn of_samples(&self, i: usize, k: usize, later: f64) -> f64 {
+    /// The covariances of a sample of converter `i` and one of converter `k`, without noise.
+    pub(super) fn of_samples(&self, i: usize, k: usize) -> Scaled<'_> {
         let gains = self.converters[i].gain * self.converters[k].gain;
         let (a, b) = (self.behaviours[i], self.behaviours[k]);
         if i == k {
-            return gains * (1.0 + self.converters[i].gain_deviation.powi(2)) * self.own[a].at(later);
+            let gains = gains * (1.0 + self.converters[i].gain_deviation.powi(2));
+            return Scaled { covariance: &self.own[a], factor: gains, sign: 1.0 };
         }
-        let number = |a: usize, b: usize| a * (a + 1) / 2 + b;
-        gains * if b <= a { self.cross[number(a, b)].at(later) } else { self.cross[number(b, a)].at(-later) }
+        let (number, sign) = if b <= a { (a * (a + 1) / 2 + b, 1.0) } else { (b * (b + 1) / 2 + a, -1.0) };
+        Scaled { covariance: &self.cross[number], factor: gains, sign }
     }
 
-    /// The covariance of a sample of converter `i` and the target at an instant `later` before it.
-    pub(super) fn of_target(&self, i: usize, later: f64) -> f64 {
-        self.converters[i].gain * self.with_target[self.behaviours[i]].at(later)
+    /// The covariances of a sample of converter `i` and the target.
+    pub(super) fn of_target(&self, i: usize) -> Scaled<'_> {
+        let covariance = &self.with_target[self.behaviours[i]];
+        Scaled { covariance, factor: self.converters[i].gain, sign: 1.0 }
+    }
+}
+
+/// A covariance times a factor, forwards or backwards in time.
+#[derive(Clone, Copy)]
+pub(super) struct Scaled<'a> {
+    covariance: &'a Covariance,
+    factor: f64,
+    sign: f64,
+}
+
+impl Scaled<'_> {
+    /// For the first sample `later` after the second one, or the target.
+    pub(super) fn at(self, later: f64) -> f64 {
+        self.factor * self.covariance.at(self.sign * later)
     }
 }
 

@@ -222,8 +222,7 @@ fn a_drift_is_followed_as_predicted() {
             .iter()
             .flat_map(|recording| {
                 let nearest = recording.nearest(at);
-                (nearest - 23..=nearest + 24)
-                    .map(move |k| (recording.sample(k), recording.samples()[k as usize]))
+                (nearest - 23..=nearest + 24).map(move |k| (recording.sample(k), recording.value(k as usize)))
             })
             .collect();
         let (samples, values): (Vec<TimedSample>, Vec<f64>) = samples.into_iter().unzip();
@@ -245,6 +244,39 @@ fn cuts_and_threads_change_no_bit() {
     let again =
         one.install(|| fuse(&estimator, &recordings, FusionSettings { count: 2990, ..settings })).unwrap();
     assert_eq!(whole.samples[..2560], again.samples[..2560]);
+}
+
+/// However samples arrive, also with lost ones, over several stretches.
+#[test]
+fn live_outputs_do_not_depend_on_cuts() {
+    let (estimator, whole) = drifting(13);
+    let live = |lengths: &mut dyn Iterator<Item = usize>| {
+        let none = whole.iter().map(|one| Recording::new(Vec::new(), one.clock().clone(), one.converter()));
+        let mut live = LiveFusion::new(estimator.clone(), none.collect(), FastPeriods(100.0), 16);
+        let (mut samples, mut errors, mut late, mut start) = (Vec::new(), Vec::new(), 0, 0);
+        while start < 3000 {
+            let end = (start + lengths.next().unwrap()).min(3000);
+            let fused = live.push(whole.iter().map(|one| one.samples()[start..end].iter().copied())).unwrap();
+            samples.extend(fused.samples);
+            errors.extend(fused.errors);
+            late = late.max(end.saturating_sub(samples.len() / 2));
+            start = end;
+        }
+        let fused = live.finish(5850).unwrap();
+        samples.extend(fused.samples);
+        errors.extend(fused.errors);
+        (samples, errors, late)
+    };
+    let (samples, errors, _) = live(&mut std::iter::repeat(3000));
+    assert_eq!((samples.len(), errors.len()), (5850, 46));
+    for length in [1, 64, 777] {
+        let (again, as_well, late) = live(&mut std::iter::repeat(length));
+        assert!(samples == again && errors == as_well, "{length}");
+        // 50 frames before the first output, 64 of a block, and those of the longest time.
+        assert!(late <= 50 + 64 + 50 + length, "{length}: {late}");
+    }
+    let settings = FusionSettings { first: FastPeriods(100.0), count: 5850, reach: 16 };
+    assert_eq!(fuse(&estimator, &whole, settings).unwrap().samples[..4096], samples[..4096]);
 }
 
 /// Two rates that share nothing, and stamps with jitter.
@@ -337,4 +369,34 @@ fn recordings_tell_their_noise_and_the_error_is_as_predicted() {
     let found = error_of(&fused, 100.0, 20 * 128..43 * 128);
     let apart = decibels(found) - decibels(predicted);
     assert!(apart.abs() < 1.0, "{} {}", decibels(found), decibels(predicted));
+}
+
+/// Where two recorders come to sample at one instant the stated errors are those of exact taps.
+#[test]
+fn errors_over_a_coincidence_are_those_of_exact_taps() {
+    let clocks = [
+        Clock::even(FastPeriods(0.0), FastPeriods(2.0)),
+        Clock::even(FastPeriods(-0.1), FastPeriods(2.00004)),
+    ];
+    let recording =
+        |i: usize| Recording::new(cosines(&clocks[i], 3500, 0..0, 2e-4, 3 + i as u64), clocks[i].clone(), i);
+    let recordings = [0, 1].map(recording);
+    let estimator = of_band(vec![Converter::exact(0, 1.0, 4e-8); 2], 260.0);
+    let settings = FusionSettings { first: FastPeriods(4000.0), count: 2048, reach: 24 };
+    let fused = fuse(&estimator, &recordings, settings).unwrap();
+    let stated = fused.errors.iter().map(|error| error.total()).sum::<f64>() / 16.0;
+    let best = |n: usize| {
+        let at = FastPeriods(4000.0 + n as f64);
+        let around = |one: &Recording| {
+            let nearest = one.nearest(at);
+            (nearest - 23..=nearest + 24).map(|k| one.sample(k)).collect::<Vec<_>>()
+        };
+        let samples: Vec<TimedSample> = recordings.iter().flat_map(around).collect();
+        estimator.taps(&samples, &[at]).unwrap().errors[0].total()
+    };
+    let exact = (0..2048).map(best).sum::<f64>() / 2048.0;
+    let measured = error_of(&fused, 4000.0, 0..2048);
+    assert!(exact > 1e-3 && (stated / exact - 1.0).abs() < 0.02, "{stated} {exact}");
+    // One coincidence is a small sample.
+    assert!((0.3..3.0).contains(&(measured / exact)), "{measured} {exact}");
 }

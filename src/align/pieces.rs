@@ -13,6 +13,7 @@ use crate::calibrate::{
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
 use crate::units::FastPeriods;
+use rayon::prelude::*;
 
 /// A measurement with a larger standard deviation says nothing, in fast periods: its interval is as wide as
 /// the distance of two channels.
@@ -67,10 +68,11 @@ impl<'a> Pieces<'a> {
     pub(super) fn measure(&self) -> Result<Vec<PieceEstimate>, AlignError> {
         let firsts = self.stretches.firsts();
         let (mut found, mut reason, mut said, mut all) = (Vec::new(), None, 0.0, 0.0);
-        for first in &firsts {
+        let estimates: Vec<_> = firsts.par_iter().map(|first| self.estimate(*first)).collect();
+        for (first, estimate) in firsts.iter().zip(estimates) {
             let level = self.level(*first);
             all += level;
-            match self.estimate(*first) {
+            match estimate {
                 Ok(Some(estimate)) => {
                     found.push(estimate);
                     said += level;

@@ -3,6 +3,7 @@
 use super::DesignError;
 use super::problem::Problem;
 use crate::analog::{SignalFilter, resolved_band};
+use crate::messages::counted;
 use crate::quantity::readable;
 use crate::spec::{Band, FilterSpec, Passband, Spec};
 use crate::units::{Hertz, RadiansPerFastPeriod};
@@ -34,9 +35,17 @@ pub fn warnings(spec: &Spec) -> Result<Vec<String>, DesignError> {
     // Of converters with unequal rates some samples coincide, and each has others.
     if spec.layout().is_plain() {
         found.extend(same_instants(&problem));
+        found.extend(later(spec.wait()));
     }
     found.extend(long_span(spec));
     Ok(found)
+}
+
+/// That negative delays are counted from a later instant.
+fn later(wait: usize) -> Option<String> {
+    let periods = counted(wait, "fast period");
+    (wait > 0)
+        .then(|| format!("a delay is negative, so all count as {periods} later; the latency includes them"))
 }
 
 /// The band of the target (`None`) or of a channel.

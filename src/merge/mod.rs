@@ -6,11 +6,13 @@
 //! estimates with other taps, so none of them is better by this model.
 
 mod clocks;
+mod course;
 mod error;
 mod tracked;
 
+pub use course::PredictedQuality;
 pub use error::{MergeError, MergeWarning};
-pub use tracked::{DelayTrack, Tracked, fuse_stamped, fuse_tracked};
+pub use tracked::{DelayTrack, Tracked, TrackedFusion, fuse_stamped, fuse_tracked};
 
 use crate::align::ClockStep;
 use crate::calibrate::Record;
@@ -18,6 +20,7 @@ use crate::instants::{Fused, FusionSettings, Model, Prior, Recording, fuse};
 use crate::sine_fit::Estimate;
 use crate::units::{CyclesPerFastPeriod, Decibels, FastPeriods, Hertz, Seconds};
 use clocks::Clocked;
+use course::ErrorCourse;
 
 /// Passes in which the spectrum is learned; a third gains nothing.
 const PASSES: usize = 2;
@@ -204,7 +207,9 @@ fn quality(
         .collect();
     let total = power(&fused.samples);
     let per_sample = total / fused.samples.len() as f64;
-    let worst = worst_second(&errors, rate.0 / fused.block as f64);
+    let mut course = ErrorCourse::new(rate.0 / fused.block as f64);
+    errors.iter().for_each(|error| course.add(*error));
+    let worst = course.worst();
     let of_worst = worst.mean / fused.block as f64;
     let ways = model.ways(recordings, grid)?;
     let ratio = |error: f64| Decibels::of_power(1.0 / error.max(f64::MIN_POSITIVE));
@@ -215,23 +220,6 @@ fn quality(
         alone: ways.alone.iter().map(|error| ratio(error.total())).collect(),
         mean: ratio(ways.mean.total()),
     })
-}
-
-/// The second of a run that has the largest errors.
-struct WorstSecond {
-    /// Its first block.
-    first: usize,
-    /// The mean error of its blocks.
-    mean: f64,
-}
-
-/// Of blocks with these errors, so many of them a second.
-fn worst_second(errors: &[f64], per_second: f64) -> WorstSecond {
-    let second = (per_second.round() as usize).clamp(1, errors.len().max(1));
-    let means = errors.windows(second).map(|blocks| blocks.iter().sum::<f64>() / second as f64);
-    let of = |(first, mean)| WorstSecond { first, mean };
-    let worst = means.enumerate().map(of).max_by(|a, b| a.mean.total_cmp(&b.mean));
-    worst.unwrap_or(WorstSecond { first: 0, mean: 0.0 })
 }
 
 #[cfg(test)]

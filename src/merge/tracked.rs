@@ -1,11 +1,12 @@
 //! Converters whose delays change: the fusion of their recordings by a table of delays over time.
 
+use super::course::{InnerCourse, PredictedQuality};
 use super::error::MergeError;
-use super::{REACH, check_memory, worst_second};
+use super::{REACH, check_memory};
 use crate::bank::Bank;
 use crate::design;
-use crate::instants::{Clock, ClockError, Fused, FusionSettings, Recording, fuse};
-use crate::units::{Decibels, FastPeriods, Seconds};
+use crate::instants::{Clock, ClockError, FusionSettings, LiveFusion, Recording, fuse};
+use crate::units::{FastPeriods, Seconds};
 
 /// The delays of all converters at some times, on lines between them.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,37 +24,87 @@ pub struct Tracked {
     pub samples: Vec<f64>,
     /// The time of the first one: of the first frame, or by the stamps.
     pub begin: Seconds,
-    /// The predicted signal-to-noise ratio away from the ends, for a signal that is flat over the band.
-    pub snr: Decibels,
-    /// Of the worst second.
-    pub worst_second: Decibels,
-    /// When it begins.
-    pub worst_at: Seconds,
+    /// How good they are.
+    pub quality: PredictedQuality,
 }
 
-/// Fuses the recordings of the converters of a bank, NaN where samples were lost. Taps are made for the
-/// delays at hand ([`crate::instants`]); those of the bank are not used.
+/// The fusion of samples, NaN where they were lost, as they arrive at the converters of a bank. Taps are made
+/// for the delays of a table ([`crate::instants`]); those of the bank are not used.
+#[derive(Debug)]
+pub struct TrackedFusion {
+    fusion: LiveFusion,
+    offsets: Vec<f64>,
+    ratio: usize,
+    /// Frames so far.
+    frames: usize,
+    course: InnerCourse,
+}
+
+impl TrackedFusion {
+    /// From the first frame on.
+    ///
+    /// # Errors
+    /// [`MergeError`]: for a bank without a spec, a band or one rate of its converters; for a table of other
+    /// converters, without delays, or of delays that jump by a sample and more.
+    pub fn new(bank: &Bank, track: &DelayTrack) -> Result<Self, MergeError> {
+        if bank.samples.iter().any(|samples| *samples != 1) {
+            return Err(MergeError::OwnRates);
+        }
+        if track.delays.len() != bank.channel_count() {
+            return Err(MergeError::Columns { given: track.delays.len(), wanted: bank.channel_count() });
+        }
+        if track.times.is_empty() {
+            return Err(MergeError::NoDelays);
+        }
+        let recording = |i: usize| Ok(Recording::new(Vec::new(), clock(bank, track, i)?, i));
+        let recordings: Vec<Recording> =
+            (0..bank.channel_count()).map(recording).collect::<Result<_, MergeError>>()?;
+        let settings = FusionSettings { first: FastPeriods(0.0), count: 0, reach: REACH };
+        let estimator = design::instants_estimator(bank, settings.longest(&recordings))?;
+        let fusion = LiveFusion::new(estimator, recordings, settings.first, REACH);
+        let course = InnerCourse::new(bank.fast_period * fusion.block() as f64);
+        Ok(Self { fusion, offsets: bank.offsets.clone(), ratio: bank.ratio, frames: 0, course })
+    }
+
+    /// Takes the next samples of each channel, as many of all, and gives the outputs that depend on no later
+    /// ones.
+    ///
+    /// # Errors
+    /// [`MergeError::Singular`].
+    pub fn push(&mut self, channels: &[Vec<f64>]) -> Result<Vec<f64>, MergeError> {
+        self.frames += channels.iter().map(Vec::len).min().unwrap_or(0);
+        let own =
+            |(samples, offset): (&Vec<f64>, &f64)| samples.iter().map(|x| x - offset).collect::<Vec<f64>>();
+        let fused = self.fusion.push(channels.iter().zip(&self.offsets).map(own))?;
+        Ok(self.course.judged(fused))
+    }
+
+    /// The last outputs, and how good all of them are.
+    ///
+    /// # Errors
+    /// [`MergeError::NoSamples`] if there were none; as [`TrackedFusion::push`].
+    pub fn finish(self) -> Result<(Vec<f64>, PredictedQuality), MergeError> {
+        let Self { fusion, ratio, frames, mut course, .. } = self;
+        if frames == 0 {
+            return Err(MergeError::NoSamples);
+        }
+        let fused = fusion.finish(frames.saturating_mul(ratio))?;
+        Ok((course.judged(fused), course.quality()))
+    }
+}
+
+/// Fuses whole recordings as [`TrackedFusion`] does.
 ///
 /// # Errors
-/// [`MergeError`]: for a bank without a spec, a band or one rate of its converters; for a table of other
-/// converters, without delays, or of delays that jump by a sample and more; for recordings without samples.
+/// As [`TrackedFusion::new`] and [`TrackedFusion::finish`].
 pub fn fuse_tracked(bank: &Bank, channels: &[Vec<f64>], track: &DelayTrack) -> Result<Tracked, MergeError> {
-    if bank.samples.iter().any(|samples| *samples != 1) {
-        return Err(MergeError::OwnRates);
-    }
-    if track.delays.len() != bank.channel_count() {
-        return Err(MergeError::Columns { given: track.delays.len(), wanted: bank.channel_count() });
-    }
-    if track.times.is_empty() {
-        return Err(MergeError::NoDelays);
-    }
-    let count = channels.iter().map(Vec::len).min().unwrap_or(0).saturating_mul(bank.ratio);
-    if count == 0 {
-        return Err(MergeError::NoSamples);
-    }
-    let clocks: Vec<Clock> =
-        (0..channels.len()).map(|i| clock(bank, track, i)).collect::<Result<_, MergeError>>()?;
-    fused(bank, channels, clocks, FusionSettings { first: FastPeriods(0.0), count, reach: REACH })
+    let mut fusion = TrackedFusion::new(bank, track)?;
+    let count = channels.iter().map(Vec::len).min().unwrap_or(0);
+    let common: Vec<Vec<f64>> = channels.iter().map(|samples| samples[..count].to_vec()).collect();
+    let mut samples = fusion.push(&common)?;
+    let (last, quality) = fusion.finish()?;
+    samples.extend(last);
+    Ok(Tracked { samples, begin: Seconds(0.0), quality })
 }
 
 /// Fuses the recordings of the converters of a bank, each sample of which has its time stamp; NaN where
@@ -85,25 +136,17 @@ pub fn fuse_stamped(
         return Err(MergeError::Overlap { seconds, samples: longest });
     }
     let count = (end - begin) as usize + 1;
-    let tracked =
-        fused(bank, channels, clocks, FusionSettings { first: FastPeriods(begin), count, reach: REACH })?;
-    Ok(Tracked { begin: origin + bank.fast_period * begin, ..tracked })
-}
-
-/// The outputs from samples at the instants of clocks.
-fn fused(
-    bank: &Bank,
-    channels: &[Vec<f64>],
-    clocks: Vec<Clock>,
-    settings: FusionSettings,
-) -> Result<Tracked, MergeError> {
+    let settings = FusionSettings { first: FastPeriods(begin), count, reach: REACH };
     check_memory(settings.count)?;
     let recording = |((i, samples), clock): ((usize, &Vec<f64>), Clock)| {
         Recording::new(samples.iter().map(|x| x - bank.offsets[i]).collect(), clock, i)
     };
     let recordings: Vec<Recording> = channels.iter().enumerate().zip(clocks).map(recording).collect();
     let estimator = design::instants_estimator(bank, settings.longest(&recordings))?;
-    Ok(judged(fuse(&estimator, &recordings, settings)?, bank))
+    let fused = fuse(&estimator, &recordings, settings)?;
+    let mut course = InnerCourse::new(bank.fast_period * fused.block as f64);
+    let samples = course.judged(fused);
+    Ok(Tracked { samples, begin: origin + bank.fast_period * begin, quality: course.quality() })
 }
 
 /// When a converter takes its samples: sample k at kM - D.
@@ -122,23 +165,6 @@ fn clock(bank: &Bank, track: &DelayTrack, converter: usize) -> Result<Clock, Mer
         let frame = if let ClockError::NotAscending { sample } = problem { sample } else { 0.0 };
         MergeError::Track { channel: converter + 1, frame }
     })
-}
-
-/// The first and the last block have the errors of the ends of a recording, where samples on one side lack.
-fn judged(fused: Fused, bank: &Bank) -> Tracked {
-    let ends = usize::from(fused.errors.len() > 2);
-    let inner = &fused.errors[ends..fused.errors.len() - ends];
-    let errors: Vec<f64> = inner.iter().map(|error| error.total()).collect();
-    let block = Seconds(fused.block as f64 * bank.fast_period.0);
-    let worst = worst_second(&errors, 1.0 / block.0);
-    let ratio = |error: f64| Decibels::of_power(1.0 / error.max(f64::MIN_POSITIVE));
-    Tracked {
-        snr: ratio(errors.iter().sum::<f64>() / errors.len() as f64),
-        worst_second: ratio(worst.mean),
-        worst_at: Seconds((ends + worst.first) as f64 * block.0),
-        samples: fused.samples,
-        begin: Seconds(0.0),
-    }
 }
 
 #[cfg(test)]
@@ -200,8 +226,12 @@ mod tests {
         }
         let snr = 10.0 * (power / error).log10();
         // Tones are no flat spectrum.
-        assert!((snr - tracked.snr.0).abs() < 6.0, "{snr} measured, {} predicted", tracked.snr);
-        assert!(snr > 60.0 && tracked.worst_second.0 <= tracked.snr.0 + 1e-9, "{snr}");
+        assert!(
+            (snr - tracked.quality.snr.0).abs() < 6.0,
+            "{snr} measured, {} predicted",
+            tracked.quality.snr
+        );
+        assert!(snr > 60.0 && tracked.quality.worst_second.0 <= tracked.quality.snr.0 + 1e-9, "{snr}");
     }
 
     /// The stamps of each converter jitter by a tenth of its period, and it loses samples.
@@ -226,7 +256,11 @@ mod tests {
             power += truth * truth;
         }
         let snr = 10.0 * (power / error).log10();
-        assert!(snr > 45.0 && (snr - tracked.snr.0).abs() < 8.0, "{snr} measured, {} predicted", tracked.snr);
+        assert!(
+            snr > 45.0 && (snr - tracked.quality.snr.0).abs() < 8.0,
+            "{snr} measured, {} predicted",
+            tracked.quality.snr
+        );
         let apart = [vec![Seconds(0.0), Seconds(1.0)], vec![Seconds(5.0), Seconds(6.0)]];
         let refused = fuse_stamped(&bank, &[vec![0.0; 2], vec![0.0; 2]], &apart).unwrap_err();
         assert!(refused.to_string().contains("in common"), "{refused}");

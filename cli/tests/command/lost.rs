@@ -288,6 +288,19 @@ fn a_table_of_delays_is_followed() {
         let predicted = report["predicted_snr_db"].as_f64().unwrap();
         assert!(followed > 75.0 && predicted > 75.0 && fixed < 40.0, "{followed}, {predicted}, {fixed}");
     }
+    // A stream gives the same samples, whatever it reads at a time.
+    let fused = wav::samples(&desk, "y.wav");
+    let files = ["--input", "cap/ch1.wav", "--input", "cap/ch2.wav", "--format", "wav"];
+    let report = desk
+        .report(&[&["stream", "bank.json", "-o", "s.wav", "--track", "drift.jsonl"], &files[..]].concat());
+    assert!(report["worst_second_db"].as_f64().unwrap() > 75.0 && report["interrupted"] == false);
+    assert_eq!(wav::samples(&desk, "s.wav"), fused);
+    let channels = ["cap/ch1.wav", "cap/ch2.wav"].map(|file| wav::samples(&desk, file));
+    let frames = channels[0].iter().zip(&channels[1]);
+    let raw: Vec<u8> = frames.flat_map(|(a, b)| [a.to_le_bytes(), b.to_le_bytes()].concat()).collect();
+    let piped = desk.run(&["stream", "bank.json", "--track", "drift.jsonl"], &raw).stdout;
+    assert!(piped == fused.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>());
+    desk.refused(2, &["stream", "bank.json", "--track", "drift.jsonl", "--flush"], &["--flush"]);
     desk.write("one.csv", "time,a\n0,0\n");
     let args = ["fuse", "bank.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "no.wav", "--track"];
     desk.refused(1, &[&args[..], &["one.csv"]].concat(), &["one.csv", "1 column of delays", "2 channels"]);

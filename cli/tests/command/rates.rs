@@ -245,3 +245,46 @@ fn worst_cases_take_one_error_per_converter() {
     assert!(at.as_f64().unwrap() < without.as_f64().unwrap(), "{plain} {moved}");
     desk.refused(1, &["analyze", "bank.json", "--delay-error", "0,0,0,1e-9,1e-9"], &["2"]);
 }
+
+/// Converters that sample later than their frame begins: the design is that of delays two fast periods
+/// larger, and the output lies on the time axis.
+#[test]
+fn negative_delays_count_from_a_later_instant() {
+    let desk = Desk::new();
+    let spec = |delays: [f64; 2]| {
+        let channel = |delay: f64| format!("[[channel]]\ndelay_samples = {delay}\nbits = 16\n");
+        format!(
+            "fast_rate = 48000\nratio = 2\nlatency = 24\n[target]\nfilter = {{ family = \"butterworth\", order = 4, \
+             cutoff = 14000 }}\n[signal]\nband = 18000\n{}{}[design]\nmethod = \"h2\"\ntaps = 40\n",
+            channel(delays[0]),
+            channel(delays[1])
+        )
+    };
+    let taps = |name: &str| {
+        let bank: Value = serde_json::from_slice(&desk.read(&format!("{name}.json"))).unwrap();
+        let channels = bank["channels"].as_array().unwrap().iter();
+        let taps = channels.flat_map(|one| one["taps"].as_array().unwrap());
+        taps.map(|tap| tap.as_f64().unwrap()).collect::<Vec<f64>>()
+    };
+    for (name, delays) in [("late", [-1.5, -0.75]), ("early", [0.5, 1.25])] {
+        desk.write(&format!("{name}.toml"), spec(delays));
+        let (toml, json) = (format!("{name}.toml"), format!("{name}.json"));
+        let said = desk.run(&["design", &toml, "-o", &json], &[]);
+        let expected = "a delay is negative, so all count as 2 fast periods later; the latency includes them";
+        assert_eq!(text(&said.stderr).contains(expected), name == "late", "{said:?}");
+        let tones = "tones:440Hz,3.1kHz,7.3kHz,11.9kHz,16.1kHz";
+        desk.good(&["simulate", &json, "--source", tones, "--samples", "8000", "-o", name]);
+        let [one, two] = ["ch1", "ch2"].map(|file| format!("{name}/{file}.wav"));
+        desk.report(&["fuse", &json, &one, &two, "-o", "out.wav"]);
+        let (got, want) =
+            (wav::samples(&desk, "out.wav"), wav::samples(&desk, &format!("{name}/target.wav")));
+        let inner = 200..want.len() - 200;
+        let power: f64 = want[inner.clone()].iter().map(|x| f64::from(*x).powi(2)).sum();
+        let error: f64 = inner.map(|n| f64::from(got[n] - want[n]).powi(2)).sum();
+        assert!(10.0 * (power / error).log10() > 70.0, "{name}: {}", 10.0 * (power / error).log10());
+    }
+    // Delays in seconds are rounded.
+    let (late, early) = (taps("late"), taps("early"));
+    assert_eq!((late.len(), early.len()), (80, 80));
+    assert!(late.iter().zip(&early).all(|(a, b)| (a - b).abs() < 1e-9), "{late:?} {early:?}");
+}

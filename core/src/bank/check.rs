@@ -109,7 +109,7 @@ impl Bank {
         within(self.frame_samples() as f64, 0.0..=most, "samples", rule).at("channels")?;
         let wait = self.wait();
         let rule = format!(
-            "the last sample of a frame comes {wait} fast samples after the first, which the latency includes"
+            "the last sample of a frame comes {wait} fast samples after its instant, which the latency includes"
         );
         within(self.latency as f64, wait as f64..=f64::MAX, "fast samples", rule).at("latency")
     }
@@ -187,7 +187,7 @@ impl Bank {
         }
         for (i, (&delay, channel)) in self.delays.iter().zip(&spec.channels).enumerate() {
             let path = |key: &str| format!("spec.channel[{i}].{key}");
-            agree(&path("delay"), delay.0, channel.delay.0, (self.fast_period + delay).0)?;
+            agree(&path("delay"), delay.0, channel.delay.0, self.fast_period.0 + delay.0.abs())?;
             agree(&path("gain"), self.gains[i], channel.gain, channel.gain.abs())?;
             agree(&path("offset"), self.offsets[i], channel.offset, channel.offset.abs())?;
         }
@@ -221,9 +221,12 @@ fn agree(path: &str, bank: f64, spec: f64, size: f64) -> Checked {
 fn check_delays(delays: &[Seconds], fast_period: Seconds) -> Checked {
     check_channel_count(delays.len()).at("channels")?;
     let most = MAX_BANK_LATENCY as f64;
-    match delays.iter().position(|delay| !(0.0..=most).contains(&delay.in_fast_periods(fast_period).0)) {
+    match delays
+        .iter()
+        .position(|delay| delay.in_fast_periods(fast_period).0.abs() > most || delay.0.is_nan())
+    {
         Some(i) => {
-            let rule = format!("a delay is zero or more, and at most {most} fast periods; check its unit");
+            let rule = format!("a delay is at most {most} fast periods; check its unit");
             out_of_range(format!("channels[{i}].delay"), delays[i].0, "s", rule)
         }
         None => Ok(()),

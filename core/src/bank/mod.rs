@@ -191,7 +191,8 @@ impl Bank {
         self.samples.iter().sum()
     }
 
-    /// S, the part of the latency for which a frame waits for its last sample; 0 for converters of one rate.
+    /// S, the part of the latency for which a frame waits for its last sample; 0 for converters of one rate
+    /// without negative delays.
     pub fn wait(&self) -> usize {
         self.layout().wait(&self.grid_delays())
     }

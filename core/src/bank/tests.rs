@@ -292,7 +292,7 @@ fn every_mistake_names_its_json_place_and_the_remedy() {
         (last("\"fir\"", "\"firr\""), "method", "did you mean \"fir\""),
         (last("\"fir\"", "\"iir\""), "method", "a bank of the method iir holds state_space and no taps"),
         (ss_with("\"iir\"", "\"sinc\""), "method", "a bank of the method sinc holds taps"),
-        (last("\"delay\": 0.6", "\"delay\": -0.6"), "channels[1].delay", "zero or more"),
+        (last("\"delay\": 0.6", "\"delay\": -6e7"), "channels[1].delay", "check its unit"),
         (last("\"delay\": 0.6", "\"delay\": 0.61"), "spec.channel[1].delay", "the bank says 0.61"),
         (last("\"delay\": 0.6", "\"dealy\": 0.6"), "channels[1]", "did you mean \"delay\""),
         (last("0.3333333333333333", "null"), "channels[0].taps[2]", "perhaps written for NaN"),

@@ -8,7 +8,8 @@
 //!
 //! A frame is complete when its last sample is there. The delays of these channels are D_ij + S, where S is
 //! the least whole number of fast periods for which none is negative. So the latency counts from the instant
-//! of a sample, the wait for the rest of its frame included. With equal rates L_i = 1 and S = 0.
+//! of a sample, the wait for the rest of its frame included. With equal rates L_i = 1, and S = 0 if no
+//! delay is negative.
 
 use super::error::At;
 use super::limits::{self, range};
@@ -108,7 +109,7 @@ impl FrameLayout {
             // A whole number may have been rounded up.
             (ahead - 4.0 * f64::EPSILON * (1.0 + ahead.abs() + self.ratio as f64)).ceil().max(0.0) as usize
         };
-        if self.is_plain() { 0 } else { self.delays(delays).iter().map(late).max().unwrap_or(0) }
+        self.delays(delays).iter().map(late).max().unwrap_or(0)
     }
 
     /// D_ij + S.
@@ -240,7 +241,7 @@ pub(super) fn checked(
 pub(super) fn check_latency(latency: Option<usize>, wait: usize) -> Result<(), SpecProblem> {
     let Some(latency) = latency.filter(|&latency| latency < wait) else { return Ok(()) };
     let rule = format!(
-        "the last sample of a frame comes {wait} fast samples after the first, and the latency includes this \
+        "the last sample of a frame comes {wait} fast samples after its instant, and the latency includes this \
          wait; give {wait} or more"
     );
     Err(range(latency as f64, "fast samples", rule))

@@ -286,7 +286,7 @@ impl Spec {
             rate: None,
             ..self.channels[converter].clone()
         };
-        match layout.is_plain() {
+        match layout.is_plain() && self.wait() == 0 {
             true => self.clone(),
             false => Self {
                 channels: layout.owners().into_iter().zip(delays).map(channel).collect(),
@@ -296,7 +296,8 @@ impl Spec {
         }
     }
 
-    /// S, the part of a latency for which a frame waits for its last sample; 0 for converters of one rate.
+    /// S, the part of a latency for which a frame waits for its last sample; 0 for converters of one rate
+    /// without negative delays.
     pub fn wait(&self) -> usize {
         self.layout().wait(&self.delays())
     }
