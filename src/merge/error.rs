@@ -5,6 +5,7 @@ use crate::design::DesignError;
 use crate::instants::ClockError;
 use crate::linalg::LinalgError;
 use crate::messages::{Quoted, counted};
+use crate::quantity::readable;
 use crate::units::Hertz;
 
 /// Why recordings cannot be merged.
@@ -40,6 +41,20 @@ pub enum MergeError {
         name: String,
         /// What is wrong with them.
         problem: ClockError,
+    },
+    /// Samples come far more rarely than those of the converter.
+    #[error(
+        "{name} has {} on average, but the bank is designed for {}; design a bank for this rate, or merge the recordings with \
+         a --rate",
+        readable(found.0, "S/s"), readable(wanted.0, "S/s")
+    )]
+    Sparse {
+        /// The channel.
+        name: String,
+        /// Its mean rate.
+        found: Hertz,
+        /// That of the bank.
+        wanted: Hertz,
     },
     /// Nothing but one value.
     #[error("{} has no signal: all its samples are equal or lost; leave it out", Quoted(.name))]

@@ -6,7 +6,10 @@ use super::{REACH, check_memory};
 use crate::bank::Bank;
 use crate::design;
 use crate::instants::{Clock, ClockError, FusionSettings, LiveFusion, Recording, fuse};
-use crate::units::{FastPeriods, Seconds};
+use crate::units::{FastPeriods, Hertz, Seconds};
+
+/// Share of the rate of the converter below which stamps are those of something else.
+const SPARSE: f64 = 0.5;
 
 /// The delays of all converters at some times, on lines between them.
 #[derive(Debug, Clone, PartialEq)]
@@ -127,6 +130,9 @@ pub fn fuse_stamped(
         Clock::stamps(&instants).map_err(|problem| MergeError::Stamps { name, problem })
     };
     let clocks: Vec<Clock> = stamps.iter().enumerate().map(clock).collect::<Result<_, _>>()?;
+    for (i, (clock, samples)) in clocks.iter().zip(channels).enumerate() {
+        check_rate(bank, i, clock, samples.len())?;
+    }
     let last = |(clock, samples): (&Clock, &Vec<f64>)| clock.at(samples.len().saturating_sub(1) as f64).0;
     let begin = clocks.iter().map(|clock| clock.at(0.0).0).fold(0.0, f64::max).ceil();
     let end = clocks.iter().zip(channels).map(last).fold(f64::INFINITY, f64::min).floor();
@@ -147,6 +153,17 @@ pub fn fuse_stamped(
     let mut course = InnerCourse::new(bank.fast_period * fused.block as f64);
     let samples = course.judged(fused);
     Ok(Tracked { samples, begin: origin + bank.fast_period * begin, quality: course.quality() })
+}
+
+/// Refuses stamps that are so far apart that the bank was meant for something else.
+fn check_rate(bank: &Bank, channel: usize, clock: &Clock, samples: usize) -> Result<(), MergeError> {
+    let last = samples.saturating_sub(1) as f64;
+    let found = Hertz(last / (bank.fast_period.0 * (clock.at(last).0 - clock.at(0.0).0)));
+    let wanted = Hertz(bank.samples[channel] as f64 / bank.slow_period().0);
+    if samples > 1 && found.0 < SPARSE * wanted.0 {
+        return Err(MergeError::Sparse { name: format!("channel {}", channel + 1), found, wanted });
+    }
+    Ok(())
 }
 
 /// When a converter takes its samples: sample k at kM - D.

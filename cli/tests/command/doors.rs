@@ -159,4 +159,9 @@ fn samples_are_fused_at_their_stamps() {
     assert!(10.0 * f64::log10(power / error) > 60.0, "{}", 10.0 * f64::log10(power / error));
     let refused = ["fuse", "bank.json", "a.csv", "--stamps", "-o", "z.wav"];
     desk.refused(1, &refused, &["2 channels, but the tables have 1 column"]);
+    let rare: String =
+        (0..200).map(|k| format!("{:.3},{:.3}\n", 0.01 * f64::from(k), value(0.01 * f64::from(k)))).collect();
+    desk.write("rare.csv", format!("time,x\n{rare}"));
+    let refused = ["fuse", "bank.json", "rare.csv", "rare.csv", "--stamps", "-o", "z.wav"];
+    desk.refused(1, &refused, &["channel 1 has 100 S/s on average, but the bank is designed for 500 S/s"]);
 }
