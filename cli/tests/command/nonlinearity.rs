@@ -88,6 +88,6 @@ fn a_nonlinearity_of_half_a_step_is_found_and_taken_out() {
     println!("SFDR {before:.1} dB without, {after:.1} dB with the nonlinearity");
     assert!(after > before + 15.0, "{before} {after}");
     // Curves have no place in other tools.
-    let refused = desk.run(&["export", "bank.json", "--format", "c99", "-o", "bank.h"], &[]);
+    let refused = desk.run(&["export", "bank.json", "--format", "c", "-o", "bank.h"], &[]);
     assert!(!refused.status.success() && String::from_utf8_lossy(&refused.stderr).contains("nonlinearity"));
 }
