@@ -3,8 +3,8 @@
 
 use super::support::{FIR_ALGORITHMS, Noise, fir_bank, precise, random_taps, recursive_bank};
 use crate::{
-    Algorithm, BuildError, Interleaved, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision,
-    SampleLayout, SideBySide, StateMatrices, Stream,
+    Algorithm, BuildError, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision, SampleLayout,
+    SideBySide, StateMatrices, Stream,
 };
 
 /// Frames of a test: more than two batches of overlap-save with transforms of 64 frames.
@@ -184,9 +184,9 @@ fn nonlinearities_are_subtracted_at_the_sample_as_it_is() {
     let options = Options { precision: Precision::Double, ..Options::default() };
     let plain = Plan::from_taps(&taps, 2, 0, options).unwrap();
     let corrected = plain.clone().with_corrections(&offsets, &curves).unwrap();
-    let run = |plan: Plan, frames: &[f64]| {
-        let (mut output, source) = (vec![0.0; 400], Interleaved::new(frames, 3).unwrap());
-        plan.stream().run(&source, &mut Planar::new(&mut output)).unwrap();
+    let run = |plan: Plan, frames: &[f64]| -> Vec<f64> {
+        let mut output = vec![0.0; 400];
+        Stream::new(&plan).process(frames, &mut output).unwrap();
         output
     };
     let (got, want) = (run(corrected, &frames), run(plain, &expected));
