@@ -24,6 +24,8 @@ const MOST_SAMPLES: usize = 1 << 26;
 /// Values of a larger misfit are not written unless asked for: intervals that are widened by more than this
 /// no longer describe errors of the values.
 const MOST_MISFIT: f64 = 10.0;
+/// The same of any signal: what the model gets wrong moves its values by more than the intervals grow.
+const MOST_BLIND_MISFIT: f64 = 2.0;
 
 /// Measures delay, gain and offset of each channel from captures, with 95 % intervals
 ///
@@ -78,6 +80,11 @@ pub(super) struct Args {
     /// delay,gain,offset]
     #[arg(long, value_name = "VALUE,..", value_delimiter = ',')]
     fit: Vec<Fitting>,
+    /// Also find the static nonlinearity of each converter, a polynomial up to this order (2 to 32). It is
+    /// written where it lowers what the tones leave of samples that it was not fitted to
+    #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(2..=32),
+          conflicts_with_all = ["training", "blind"])]
+    nonlinearity: Option<u8>,
     /// Captures of the same converters to check the calibrated spec with, of the same kind of signal
     #[arg(long, value_name = "HOLDOUT", num_args = 1..)]
     check: Vec<PathBuf>,
@@ -157,6 +164,8 @@ impl Args {
                 CalibrationSignal::Tones(_) => CalibrationSignal::Tones(Vec::new()),
                 signal => signal,
             };
+            let fit = FittedValues { nonlinearity: None, ..settings.fit };
+            let settings = CalibrationSettings { fit, ..settings };
             let checked = calibrate_pooled(&calibrated, &borrowed(&captures), &held_out, settings)
                 .map_err(|error| Failure::Input(format!("the held-out captures: {error}")))?;
             report.check(&calibrated, &found, &checked);
@@ -167,15 +176,17 @@ impl Args {
 
     /// Refuses values that the captures contradict. What explains that joins the `warnings`.
     fn check_misfit(&self, found: &Calibration, warnings: &mut Vec<String>) -> Result<(), Failure> {
-        let Some(misfit) = found.misfit.filter(|&misfit| misfit > MOST_MISFIT && !self.force) else {
+        use CalibrationWarning::{BandsDisagree, CutoffExplains, Outlying};
+        let most = if self.blind { MOST_BLIND_MISFIT } else { MOST_MISFIT };
+        let Some(misfit) = found.misfit.filter(|&misfit| misfit > most && !self.force) else {
             return Ok(());
         };
         let reasons = |warning: &&CalibrationWarning| {
-            matches!(warning, CalibrationWarning::Outlying { .. } | CalibrationWarning::CutoffExplains { .. })
+            matches!(warning, Outlying { .. } | CutoffExplains { .. } | BandsDisagree { .. })
         };
         warnings.extend(found.warnings.iter().filter(reasons).map(explained));
         Err(Failure::Input(format!(
-            "the captures contradict the spec: they differ from its model {misfit:.0} times as much as their noise \
+            "the captures contradict the spec: they differ from its model {misfit:.1} times as much as their noise \
              explains, so the values mean nothing and were not written; check the frequencies and their zones, the \
              front ends and the order of the captures, or write them all the same with --force"
         )))
@@ -252,6 +263,7 @@ impl Args {
             .map_err(|error| bad_flag("fit", error.problem()))?;
         let given = if self.fit.is_empty() { &spec.fit } else { &self.fit };
         let fit = if given.is_empty() { FittedValues::default() } else { given.iter().copied().collect() };
+        let fit = FittedValues { nonlinearity: self.nonlinearity.map(usize::from), ..fit };
         let reference = reference(self.reference, spec)?;
         Ok(CalibrationSettings { fit, reference })
     }

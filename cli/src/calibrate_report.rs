@@ -37,6 +37,9 @@ struct CalibratedChannel {
     /// Factor of the cut-off frequency.
     #[serde(skip_serializing_if = "Option::is_none")]
     cutoff: Option<Interval>,
+    /// a_2, a_3, .. of the static nonlinearity; absent if it was not fitted, empty where it does not help.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    nonlinearity: Option<Vec<f64>>,
     /// Clipped samples, which were left out.
     clipped: usize,
 }
@@ -113,6 +116,7 @@ impl CalibrationReport {
                 gain: estimate.gain.map(interval),
                 offset: estimate.offset.map(interval),
                 cutoff: estimate.cutoff.map(interval),
+                nonlinearity: found.nonlinearity.as_ref().map(|curves| curves[i].clone()),
                 clipped: *clipped,
             }
         };
@@ -193,6 +197,14 @@ impl CalibrationReport {
             let _ = write!(text, "  {:<10} {:<25} {:<25} {}", channel.channel, cells[0], cells[1], cells[2]);
             if let Some(cutoff) = channel.cutoff {
                 let _ = write!(text, "  cut-off x {}", shown(cutoff));
+            }
+            match channel.nonlinearity.as_deref() {
+                Some([]) => text.push_str("  no nonlinearity that helps"),
+                Some(curve) => {
+                    let largest = curve.iter().fold(0.0, |most: f64, a| most.max(a.abs()));
+                    let _ = write!(text, "  nonlinearity of order {}, up to {largest:.1e}", curve.len() + 1);
+                }
+                None => {}
             }
             text.push('\n');
         }

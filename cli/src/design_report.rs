@@ -216,12 +216,10 @@ impl DesignReport<'_> {
             (_, Some(_)) => "computed, not proven; --verbose says why".to_owned(),
             _ => "computed".to_owned(),
         };
-        let (input, any) = match self.judged.figures.any_input {
-            Some(gamma) => ("the signal's source w", format!("; any input: {}", six_digits(gamma))),
-            None => ("the input", String::new()),
-        };
+        let input =
+            if self.judged.figures.any_input.is_some() { "the signal's source w" } else { "the input" };
         format!(
-            "gamma      {} (worst-case gain from {input} to the error; {proof}{}{any})\n",
+            "gamma      {} (worst-case gain from {input} to the error; {proof}{})\n",
             known(self.gamma.norm),
             self.above_lower()
         )
@@ -253,11 +251,12 @@ impl DesignReport<'_> {
         let Gamma { norm, lower, noncausal, .. } = *self.gamma;
         format!(
             "gamma      {} (computed norm of this bank; worst at {} modulo the slow rate)\n\
-             {}lower      {} ({}{})\n\
+             {}{}lower      {} ({}{})\n\
              noncausal  {} ({})\n",
             known(norm),
             frequency(self.peak_hertz, self.is_normalised),
             self.scale_text(),
+            any_input(self.judged.figures.any_input),
             known(lower),
             self.lower_meaning(),
             self.above_lower(),
@@ -308,6 +307,13 @@ impl DesignReport<'_> {
         let zero = against(gamma, zero_output, "zero output");
         format!("           {zero}, {}\n", against(gamma, interleaving, "plain interleaving"))
     }
+}
+
+/// gamma for inputs of any frequency, where the bank is made for a signal.
+fn any_input(gamma: Option<f64>) -> String {
+    gamma.map_or_else(String::new, |gamma| {
+        format!("any input  {} (gamma without the signal)\n", six_digits(gamma))
+    })
 }
 
 /// gamma beside that of another bank.

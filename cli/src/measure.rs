@@ -8,8 +8,8 @@ use super::print::{Failure, InFile, failed_at, is_dash, name, show, warn};
 use super::written::check_output;
 use hybank::io::is_same_rate;
 use hybank::measure::{
-    Comparison, Imbalance, MeasureWarning, Measurement, Quadrature, RecordSpectrum, Settings, Spur, Window,
-    compare,
+    Cause, Comparison, Imbalance, MeasureWarning, Measurement, Quadrature, RecordSpectrum, Settings, Spur,
+    Window, compare,
 };
 use hybank::messages::Quoted;
 use hybank::overview::{DrawnRecording, Figure, causes, column, spur_chart};
@@ -256,7 +256,10 @@ fn write_measurement(text: &mut String, measured: &Measurement) {
         let _ = writeln!(
             text,
             "tone             {:.6} ± {:.2e} Hz, amplitude {:.6} ({:.2} dBFS)",
-            tone.frequency.value.0, tone.frequency.sigma.0, tone.amplitude.value, tone.level.0
+            tone.frequency.value.0,
+            tone.frequency.half_width().0,
+            tone.amplitude.value,
+            tone.level.0
         );
         if (tone.alias - tone.frequency.value).0.abs() > 0.5 * measured.rate.0 / measured.samples as f64 {
             let _ = writeln!(text, "                 seen at {:.6}", tone.alias);
@@ -266,7 +269,7 @@ fn write_measurement(text: &mut String, measured: &Measurement) {
         text,
         "offset           {} ± {:.2e}",
         six_decimals(measured.offset.value),
-        measured.offset.sigma
+        measured.offset.half_width()
     );
     if let Some(quadrature) = &measured.quadrature {
         write_quadrature(text, quadrature);
@@ -274,37 +277,43 @@ fn write_measurement(text: &mut String, measured: &Measurement) {
     for Figure { name, value, unit, meaning } in column(measured) {
         let _ = writeln!(text, "{name:<16} {value:>9} {unit:<7}   {meaning}");
     }
+    if let Some(thd) = measured.thd_straightened {
+        let meaning = "THD without the nonlinearity that `calibrate --nonlinearity` would take out";
+        let _ = writeln!(text, "{:<16} {:>9.2} {:<7}   {meaning}", "THD, straight", thd.0, "dB");
+    }
     write_spurs(text, measured);
 }
 
 /// Of complex recordings.
 fn write_quadrature(text: &mut String, quadrature: &Quadrature) {
     let Quadrature { offset, imbalances } = quadrature;
-    let _ = writeln!(text, "offset, imag.    {} ± {:.2e}", six_decimals(offset.value), offset.sigma);
+    let _ = writeln!(text, "offset, imag.    {} ± {:.2e}", six_decimals(offset.value), offset.half_width());
     for Imbalance { gain, phase, image_rejection } in imbalances {
         let _ = writeln!(
             text,
             "I/Q imbalance    gain {:.6} ± {:.1e}, phase {:.4} ± {:.1e} degrees, image rejection {:.2} dB",
             gain.value,
-            gain.sigma,
+            gain.half_width(),
             phase.value.0.to_degrees(),
-            phase.sigma.0.to_degrees(),
+            phase.half_width().0.to_degrees(),
             image_rejection.0
         );
     }
 }
 
+/// Those above the noise, and the largest bin of the noise where that decides SFDR.
 fn write_spurs(text: &mut String, measured: &Measurement) {
-    let above: Vec<&Spur> = measured.spurs.iter().filter(|spur| spur.above_noise).collect();
-    let _ = match above.len() {
-        0 => writeln!(text, "no spur above the noise"),
-        _ => writeln!(text, "\nspurs above the noise (Hz, dBc, cause):"),
+    let is_listed = |spur: &&Spur| spur.above_noise || spur.causes == [Cause::Noise];
+    let listed: Vec<&Spur> = measured.spurs.iter().filter(is_listed).collect();
+    let _ = match listed.iter().any(|spur| spur.above_noise) {
+        false => writeln!(text, "no spur above the noise"),
+        true => writeln!(text, "\nspurs above the noise (Hz, dBc, cause):"),
     };
-    for spur in above.iter().take(MOST_SPURS) {
+    for spur in listed.iter().take(MOST_SPURS) {
         let _ = writeln!(text, "{:>18.3} {:>8.2}   {}", spur.frequency.0, spur.level.0, causes(spur));
     }
-    if above.len() > MOST_SPURS {
-        let _ = writeln!(text, "  and {} smaller ones (--json lists all)", above.len() - MOST_SPURS);
+    if listed.len() > MOST_SPURS {
+        let _ = writeln!(text, "  and {} smaller ones (--json lists all)", listed.len() - MOST_SPURS);
     }
 }
 
@@ -334,11 +343,11 @@ fn write_comparison(text: &mut String, file: &str, found: &Comparison) {
         text,
         "lag              {} ± {:.1e} samples ({})",
         six_decimals(found.lag_samples.value),
-        found.lag_samples.sigma,
+        found.lag_samples.half_width(),
         readable(found.lag.0 + 0.0, "s")
     );
-    let _ = writeln!(text, "gain             {:.8} ± {:.1e}", found.gain.value, found.gain.sigma);
-    let _ = writeln!(text, "offset           {:.3e} ± {:.1e}", found.offset.value, found.offset.sigma);
+    let _ = writeln!(text, "gain             {:.8} ± {:.1e}", found.gain.value, found.gain.half_width());
+    let _ = writeln!(text, "offset           {:.3e} ± {:.1e}", found.offset.value, found.offset.half_width());
     let _ = writeln!(
         text,
         "SNR              {:.2} dB   reference over error, lag, gain and offset taken out",

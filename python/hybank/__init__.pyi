@@ -379,6 +379,7 @@ def calibrate(
     interleaved: int | None = None,
     axis: int = -1,
     full_scale: float | str | None = None,
+    nonlinearity: int | None = None,
 ) -> Calibration: ...
 @overload
 def measure(

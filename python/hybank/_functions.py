@@ -203,7 +203,7 @@ def align(x, spec, *, reference=None, within=None, axis=-1):
 @checked
 def calibrate(
     x, spec, *, tones=None, waveform=None, rate=None, blind=False, fit=("delay", "gain", "offset"), reference=None,
-    clip=None, interleaved=None, axis=-1, full_scale=None
+    clip=None, interleaved=None, axis=-1, full_scale=None, nonlinearity=None
 ):
     """Delays, gains and offsets of the channels from captures, with their standard deviations.
 
@@ -235,6 +235,9 @@ def calibrate(
     full_scale : float or str, optional
         Full scale of the converters: "12bits", "u12bits" or a number; that of the spec or its bits if left out.
 
+    nonlinearity : int, optional
+        Also find the static nonlinearity of each converter, a polynomial up to this order (2 to 32), by tones.
+
     Returns
     -------
     Calibration
@@ -249,7 +252,9 @@ def calibrate(
     need_numbers(rate=rate)
     # A spec may be a mapping or a path; the order of its converters is that of their delays.
     x, axis = _inputs.plain(x, axis, spec, interleaved)
-    return _hybank.calibrate(x, spec, tones, waveform, rate, blind, list(fit), reference, clip, axis, full_scale)
+    return _hybank.calibrate(
+        x, spec, tones, waveform, rate, blind, list(fit), reference, clip, axis, full_scale, nonlinearity
+    )
 
 
 @checked

@@ -56,7 +56,7 @@ class Comparison(Record):
     Attributes
     ----------
     lag_samples, gain, offset
-        A ``value`` and its standard deviation ``sigma`` each. The offset is added to the record.
+        A ``value`` and the ``half_width`` of its 95 % interval each. The offset is added to the record.
     lag_seconds
         The lag.
     snr_db
@@ -417,8 +417,8 @@ class Calibration:
     reference
         The reference channel, from 1.
     tones
-        Tones that were used: ``frequency`` in hertz with a ``value`` and its standard deviation ``sigma``, the Nyquist
-        ``zone`` of the slow rate, from 1, and ``amplitude`` in the reference channel.
+        Tones that were used: ``frequency`` in hertz with a ``value`` and the ``half_width`` of its 95 % interval, the
+        Nyquist ``zone`` of the slow rate, from 1, and ``amplitude`` in the reference channel.
     modulus_samples
         Delays are known modulo this many fast periods; None if tones do not leave such a second value.
     frames
@@ -427,6 +427,8 @@ class Calibration:
         Clipped samples of each channel, which were left out.
     misfit
         1 where the model fits to the noise; None if there are no degrees of freedom left.
+    nonlinearity
+        Coefficients a_2, a_3, .. of each channel, none where they do not help; None if they were not asked for.
     notes
         What the values mean.
     warnings
@@ -448,6 +450,7 @@ class Calibration:
     frames: int
     clipped: list[int]
     misfit: float | None
+    nonlinearity: list[list[float]] | None
     notes: list[str]
     warnings: list[str]
 
@@ -459,7 +462,9 @@ class Calibration:
 @final
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
-    """The figures of a converter from the record of a tone. What was estimated has a ``value`` and its ``sigma``.
+    """The figures of a converter from the record of a tone.
+
+    What was estimated has a ``value`` and the ``half_width`` of its 95 % interval.
 
     Attributes
     ----------
@@ -488,6 +493,8 @@ class Measurement:
         Signal over what no line explains.
     thd_db, harmonics
         Harmonics over signal, up to this order.
+    thd_straightened_db
+        The same without a static nonlinearity of each converter; None where no curve helps.
     interleaving_db
         Interleaving spurs over signal; None for a single converter.
     sfdr_db
@@ -526,6 +533,7 @@ class Measurement:
     enob_full_scale: float
     snr_db: float
     thd_db: float
+    thd_straightened_db: float | None
     harmonics: int
     interleaving_db: float | None
     sfdr_db: float

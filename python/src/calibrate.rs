@@ -33,6 +33,7 @@ pub(crate) fn calibrate<'py>(
     clip: Option<f64>,
     axis: isize,
     full_scale: Option<&Bound<'_, PyAny>>,
+    nonlinearity: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = x.py();
     let spec = sources::spec(spec)?;
@@ -46,7 +47,11 @@ pub(crate) fn calibrate<'py>(
         return Err(refused("clip: give a positive level"));
     }
     let records = held.captures()?.records(clip);
-    let settings = CalibrationSettings { fit: fitted(&fit)?, reference: reference_of(&spec, reference)? };
+    if nonlinearity.is_some_and(|order| !(2..=32).contains(&order)) {
+        return Err(refused("nonlinearity: give an order from 2 to 32"));
+    }
+    let fit = FittedValues { nonlinearity, ..fitted(&fit)? };
+    let settings = CalibrationSettings { fit, reference: reference_of(&spec, reference)? };
     let nominal = spec.clone();
     let found =
         background::run(py, None, move |_| calibration::calibrate(&spec, &records, &signal, settings))?;
@@ -143,6 +148,7 @@ fn result<'py>(py: Python<'py>, spec: &Spec, found: &Calibration) -> PyResult<Bo
         .with("frames", found.frames)?
         .with("clipped", &found.clipped)?
         .with("misfit", found.misfit)?
+        .with("nonlinearity", &found.nonlinearity)?
         .with("notes", texts(notes))?
         .with("warnings", texts(warnings))?
         .object()

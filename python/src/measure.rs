@@ -123,6 +123,7 @@ fn result(py: Python<'_>, found: &Measurement) -> PyResult<Py<PyAny>> {
         .with("enob_full_scale", found.enob_full_scale)?
         .with("snr_db", found.snr.0)?
         .with("thd_db", found.thd.0)?
+        .with("thd_straightened_db", found.thd_straightened.map(|thd| thd.0))?
         .with("interleaving_db", found.interleaving.map(|level| level.0))?
         .with("sfdr_db", found.sfdr.0)?
         .with("sfdr_without_interleaving_db", found.sfdr_without_interleaving.map(|level| level.0))?

@@ -30,8 +30,6 @@ LEFT_OUT = {
 }
 # Tuples, as those of streams.
 NOT_INSIDE = {"gaps"}
-# A half-width is 1.96 standard deviations.
-RENAMED = {"half_width": "sigma"}
 
 
 def missing(printed, found, path=""):
@@ -43,7 +41,6 @@ def missing(printed, found, path=""):
         return []
     paths = []
     for key, value in printed.items():
-        key = RENAMED.get(key, key)
         own = getattr(found, key, missing)
         if own is missing:
             paths.append(f"{path}.{key}".lstrip("."))

@@ -56,6 +56,7 @@ mod tests;
 
 pub use adapters::{
     FrameSink, FrameSource, Frames, Halves, Interleaved, PcmOutput, Planar, SideBySide, SplitOutput, Zeros,
+    nonlinearity,
 };
 pub use algorithms::choice::{Algorithm, ParseAlgorithmError, Precision};
 pub use algorithms::recursive::{DelayLines, DelayedInput, StateMatrices};

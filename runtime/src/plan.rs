@@ -1,6 +1,6 @@
 //! A bank made ready to run: coefficients in the order of use, shared by any number of streams.
 
-use crate::adapters::Offsets;
+use crate::adapters::Corrections;
 use crate::algorithms::choice::{ChosenAlgorithm, check_recursive};
 use crate::algorithms::{AlgorithmFacts, Direct, OverlapSave, Recursive};
 use crate::engine::{Engine, Fir, StatefulFilter};
@@ -61,8 +61,8 @@ pub struct Plan {
     channels: usize,
     ratio: usize,
     latency: usize,
-    /// Of the converters, if any is not zero.
-    offsets: Option<Arc<Offsets>>,
+    /// Offsets and nonlinearities of the converters, if any is not zero.
+    corrections: Option<Arc<Corrections>>,
     isa: Isa,
     /// Of all that the bits of outputs depend on.
     digest: Digest,
@@ -126,10 +126,29 @@ impl Plan {
     /// # Errors
     /// [`BuildError::OffsetCount`] unless there is one for each channel; [`BuildError::NotFinite`].
     pub fn with_offsets(self, offsets: &[f64]) -> Result<Self, BuildError> {
+        self.with_corrections(offsets, &[])
+    }
+
+    /// As [`Plan::with_offsets`] for converters whose samples also have a static nonlinearity: of a sample x
+    /// of channel i
+    ///
+    /// ```text
+    /// sum over k of nonlinearity[i][k - 2] T_k(x) + offsets[i],   k = 2, 3, ..
+    /// ```
+    ///
+    /// is subtracted, with the Chebyshev polynomials T_k; beyond -1 .. 1 they keep the value of the end. An
+    /// empty list of channels stands for none.
+    ///
+    /// # Errors
+    /// As [`Plan::with_offsets`].
+    pub fn with_corrections(self, offsets: &[f64], nonlinearity: &[Vec<f64>]) -> Result<Self, BuildError> {
         let mut digest = self.digest;
         digest.add_list(offsets);
-        let offsets = Offsets::new(offsets, self.channels)?.map(Arc::new);
-        Ok(Self { offsets, digest, ..self })
+        if !nonlinearity.is_empty() {
+            digest.add_lists(nonlinearity);
+        }
+        let corrections = Corrections::new(offsets, nonlinearity, self.channels)?.map(Arc::new);
+        Ok(Self { corrections, digest, ..self })
     }
 
     fn new(start: Engine, Shape { channels, ratio }: Shape, latency: usize, isa: Isa) -> Self {
@@ -143,15 +162,15 @@ impl Plan {
             channels,
             ratio,
             latency: latency.saturating_add(facts.delay * ratio),
-            offsets: None,
+            corrections: None,
             isa,
             digest,
         }
     }
 
     /// What is subtracted from samples; `None` for nothing.
-    pub(crate) fn offsets(&self) -> Option<&Offsets> {
-        self.offsets.as_deref()
+    pub(crate) fn corrections(&self) -> Option<&Corrections> {
+        self.corrections.as_deref()
     }
 
     /// What tells this plan from those whose outputs have other bits.

@@ -2,13 +2,13 @@
 
 #[cfg(feature = "rayon")]
 use crate::adapters::SplitOutput;
-use crate::adapters::{FrameSink, FrameSource, Interleaved, WithoutOffsets, Zeros};
+use crate::adapters::{Corrected, FrameSink, FrameSource, Interleaved, Zeros};
 use crate::engine::Engine;
 use crate::state::{Count, StateHeader, StateNumbers};
 use crate::{Plan, ProcessError, Sample, StateError};
 
 /// Filters the frames of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0 before the
-/// first frame, and x_i the samples without the [offsets](Plan::with_offsets) of their converters.
+/// first frame, and x_i the samples without the [offsets](Plan::with_offsets) and nonlinearities of their converters.
 ///
 /// A frame is one sample of each of the N channels; each gives M output samples, p = 0..M - 1. All calls
 /// take whole frames and return the samples written. They allocate nothing and lock nothing (except those of
@@ -105,8 +105,8 @@ impl Stream {
         output: &mut dyn FrameSink,
     ) -> Result<usize, ProcessError> {
         let frames = self.check(input, output)?;
-        self.replaced += match self.plan.offsets() {
-            Some(offsets) => self.engine.process(&WithoutOffsets { input, offsets }, output),
+        self.replaced += match self.plan.corrections() {
+            Some(corrections) => self.engine.process(&Corrected { input, corrections }, output),
             None => self.engine.process(input, output),
         };
         self.position += frames as u64;
@@ -128,8 +128,10 @@ impl Stream {
         pool: &crate::ThreadPool,
     ) -> Result<usize, ProcessError> {
         let frames = self.check(input, output)?;
-        self.replaced += match self.plan.offsets() {
-            Some(offsets) => self.engine.process_parallel(&WithoutOffsets { input, offsets }, output, pool),
+        self.replaced += match self.plan.corrections() {
+            Some(corrections) => {
+                self.engine.process_parallel(&Corrected { input, corrections }, output, pool)
+            }
             None => self.engine.process_parallel(input, output, pool),
         };
         self.position += frames as u64;

@@ -7,7 +7,7 @@ use super::estimates::ChannelEstimate;
 use super::fit::FittedValues;
 use super::model::ChannelModel;
 use super::order::{from_one, order_of_delays};
-use super::record::Record;
+use super::record::{Acquisition, Record};
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
 use crate::units::FastPeriods;
@@ -68,11 +68,12 @@ impl Deviation {
 pub(super) fn delays_told(spec: &Spec, model: &ChannelModel, records: &[Record]) -> Delays {
     let uncertainty = spec.uncertainty.clone().unwrap_or_default();
     let reference = uncertainty.reference_channel().unwrap_or(0);
-    let Ok(blind) = Blind::new(model, records, 1) else { return Delays::default() };
+    let all = [Acquisition { name: "the captures", records }];
+    let Ok(blind) = Blind::new(model, &all, 1) else { return Delays::default() };
     if let Some(order) = other_order(&blind, records.len()) {
         return Delays::in_order(order);
     }
-    let fit = FittedValues { delay: true, gain: true, offset: false, cutoff: None };
+    let fit = FittedValues { offset: false, ..FittedValues::default() };
     let Ok(fitted) = blind.fit(CalibrationSettings { fit, reference }) else {
         return Delays { are_told: blind.tells_delays(SHARP_SIGMA), ..Delays::default() };
     };

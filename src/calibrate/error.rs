@@ -67,6 +67,9 @@ pub enum CalibrateError {
     /// Converters with rates of their own, and a signal that is not made of tones.
     #[error("converters with sample rates of their own are calibrated by tones only; capture tones")]
     OwnRates,
+    /// A nonlinearity, and a signal that is not made of tones.
+    #[error("a nonlinearity is found by tones only; capture tones, or leave it as it is")]
+    NonlinearityWithoutTones,
     /// Not one record per channel.
     #[error(
         "captures: {records}, but channels in the spec: {channels}; give one capture per channel, in the order of the spec; \
@@ -205,9 +208,9 @@ pub enum CalibrateError {
         /// What is wrong with it.
         source: Box<CalibrateError>,
     },
-    /// Several acquisitions, or none, of a signal that is not a tone.
+    /// Several acquisitions, or none, of a known waveform.
     #[error(
-        "{acquisitions} acquisitions: only those of tones are pooled; give the captures of one acquisition"
+        "{acquisitions} acquisitions: those of a known waveform are not pooled; give the captures of one acquisition"
     )]
     NotPooled {
         /// Their number.

@@ -1,7 +1,7 @@
 //! What a calibration found, and a spec with these values.
 
 use super::fit::ChannelParameter;
-use super::model::{ChannelModel, ChannelValues};
+use super::model::{ChannelModel, ChannelValues, Parameter};
 use super::warning::CalibrationWarning;
 use crate::linalg::Mat;
 use crate::sine_fit::Estimate;
@@ -23,6 +23,9 @@ pub struct Calibration {
     pub channels: Vec<ChannelEstimate>,
     /// The part of the front ends whose cut-offs were fitted.
     pub cutoff: Option<Cutoff>,
+    /// The static nonlinearity of each channel, if it was fitted: a_2, a_3, .., none where a curve does not
+    /// lower what the tones leave of samples that it was not fitted to.
+    pub nonlinearity: Option<Vec<Vec<f64>>>,
     /// The tones, if there were any.
     pub tones: Vec<CalibrationTone>,
     /// Delays are known modulo this, if tones were used and leave a second value within a thousand periods
@@ -78,12 +81,23 @@ pub(super) struct Fitted {
     /// Frames that took part.
     pub(super) frames: usize,
     pub(super) warnings: Vec<CalibrationWarning>,
+    /// The nonlinearities of the channels, if they were asked for.
+    pub(super) curves: Vec<Vec<f64>>,
 }
 
 impl Fitted {
     pub(super) fn new(point: ChannelValues, covariance: Mat, frames: usize) -> Self {
-        let (tones, warnings) = (Vec::new(), Vec::new());
-        Self { point, covariance, offsets: None, tones, modulus: None, misfit: None, frames, warnings }
+        Self {
+            point,
+            covariance,
+            offsets: None,
+            tones: Vec::new(),
+            modulus: None,
+            misfit: None,
+            frames,
+            warnings: Vec::new(),
+            curves: Vec::new(),
+        }
     }
 
     /// Notes the misfit, and widens the intervals by it if it is more than chance; returns it then.
@@ -99,7 +113,7 @@ impl Fitted {
 
     /// Widens the interval of a fitted value so that one standard deviation reaches to another value, so far
     /// away.
-    pub(super) fn reach(&mut self, channel: usize, kind: ChannelParameter, distance: f64) {
+    pub(super) fn reach(&mut self, Parameter { channel, kind }: Parameter, distance: f64) {
         if let Some(k) = self.point.index(channel, kind) {
             self.covariance[(k, k)] += distance.powi(2);
         }
@@ -131,6 +145,21 @@ pub(super) fn contradiction(squares: f64, freedom: usize) -> Option<f64> {
     is_clear.then(|| (squares / freedom as f64).sqrt())
 }
 
+/// The weighted mean of estimates of one value. Where they contradict each other by more than chance, its
+/// standard deviation is as much larger.
+pub(super) fn pooled(all: impl Iterator<Item = Estimate<f64>> + Clone) -> Estimate<f64> {
+    let count = all.clone().count();
+    if let (1, Some(one)) = (count, all.clone().next()) {
+        return one;
+    }
+    let weight = |one: &Estimate<f64>| one.sigma.powi(2).max(f64::MIN_POSITIVE).recip();
+    let weights: f64 = all.clone().map(|one| weight(&one)).sum();
+    let value = all.clone().map(|one| weight(&one) * one.value).sum::<f64>() / weights;
+    let squares: f64 = all.map(|one| weight(&one) * (one.value - value).powi(2)).sum();
+    let widening = contradiction(squares, count - 1).unwrap_or(1.0);
+    Estimate { value, sigma: widening / weights.sqrt() }
+}
+
 /// The value that chi squared exceeds as rarely as a Gaussian exceeds `z` standard deviations (Wilson and
 /// Hilferty, 1931).
 fn chi_squared_quantile(freedom: usize, z: f64) -> f64 {
@@ -153,6 +182,12 @@ pub fn applied(spec: &Spec, calibration: &Calibration) -> (Spec, Vec<Calibration
         {
             channel.filter = filter;
         }
+    }
+    if let Some(curves) = &calibration.nonlinearity {
+        new.channels
+            .iter_mut()
+            .zip(curves)
+            .for_each(|(channel, curve)| channel.nonlinearity.clone_from(curve));
     }
     let before = spec.uncertainty.clone().unwrap_or_default();
     let channels = &calibration.channels;

@@ -14,18 +14,21 @@ pub struct FittedValues {
     pub offset: bool,
     /// Cut-off frequencies of the front ends.
     pub cutoff: Option<Cutoff>,
+    /// The highest order of the static nonlinearity, by tones only.
+    pub nonlinearity: Option<usize>,
 }
 
 impl Default for FittedValues {
     /// Delays, gains and offsets.
     fn default() -> Self {
-        Self { delay: true, gain: true, offset: true, cutoff: None }
+        Self { delay: true, gain: true, offset: true, cutoff: None, nonlinearity: None }
     }
 }
 
 impl FittedValues {
     /// Nothing.
-    pub const NOTHING: Self = Self { delay: false, gain: false, offset: false, cutoff: None };
+    pub const NOTHING: Self =
+        Self { delay: false, gain: false, offset: false, cutoff: None, nonlinearity: None };
 
     /// The fitted parameters of a channel that is not the reference.
     pub(super) fn kinds(self) -> Vec<ChannelParameter> {

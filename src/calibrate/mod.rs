@@ -14,8 +14,9 @@
 //! and a phase of the channel. Each part has an offset of its own, and a spec has one per channel, so those
 //! are only noted.
 //!
-//! A delay, a gain and a cut-off that all channels have in common cannot be observed. One channel is the
-//! reference and keeps the values of the spec.
+//! A delay and a gain that all channels have in common cannot be observed. One channel is the reference and
+//! keeps the values of the spec; its cut-off is fitted where tones tell it, or where the spec says how uncertain
+//! it is.
 //!
 //! # Intervals
 //! Every [`Estimate`](crate::sine_fit::Estimate) has its standard deviation: the Cramer-Rao bound for
@@ -126,7 +127,7 @@ pub fn calibrate(
 /// own. One value of each channel fits all of them, and the offsets are their weighted means.
 ///
 /// # Errors
-/// [`CalibrateError`], for signals other than tones also if there is more than one acquisition.
+/// [`CalibrateError`], for a known waveform also if there is more than one acquisition.
 pub fn calibrate_pooled(
     spec: &Spec,
     acquisitions: &[Acquisition<'_>],
@@ -138,22 +139,29 @@ pub fn calibrate_pooled(
             .and_then(|()| check_parts(records, signal))
             .map_err(|error| error.within(name, acquisitions.len()))?;
     }
-    let (mut model, reference) = (ChannelModel::new(spec)?, settings.reference);
+    let reference = settings.reference;
+    let mut model = ChannelModel::new(spec)?;
     if let Some(part) = settings.fit.cutoff {
         model = model.scaling(part, spec)?;
     }
-    let mut fitted = match (signal, acquisitions) {
-        (CalibrationSignal::Tones(frequencies), _) => {
-            tones::fit(&model, spec, acquisitions, frequencies, settings)?
+    let fit = |spec: &Spec, order| {
+        let records: Vec<Vec<Record>> =
+            acquisitions.iter().map(|one| record::straightened(spec, one.records)).collect();
+        let straight = acquisitions.iter().zip(&records);
+        let straight: Vec<_> = straight.map(|(one, records)| Acquisition { records, ..*one }).collect();
+        let settings =
+            CalibrationSettings { fit: FittedValues { nonlinearity: order, ..settings.fit }, ..settings };
+        fitted(&model, spec, &straight, signal, settings)
+    };
+    let order = settings.fit.nonlinearity;
+    let mut fitted = match order {
+        None => fit(spec, None)?,
+        // The tones of samples as they are tell the curves, and those of straight samples the values.
+        Some(_) => {
+            let bent = with_nonlinearity(spec, vec![Vec::new(); spec.channels.len()]);
+            let curves = fit(&bent, order)?.curves;
+            Fitted { curves: curves.clone(), ..fit(&with_nonlinearity(spec, curves), None)? }
         }
-        _ if !spec.layout().is_plain() => return Err(CalibrateError::OwnRates),
-        (CalibrationSignal::Waveform { samples, spacing }, [Acquisition { records, .. }]) => {
-            waveform::Training::new(&model, records, samples, *spacing, settings)?.fit()?
-        }
-        (CalibrationSignal::Any, [Acquisition { records, .. }]) => {
-            blind::Blind::new(&model, records, usize::MAX)?.fit(settings)?
-        }
-        _ => return Err(CalibrateError::NotPooled { acquisitions: acquisitions.len() }),
     };
     // Tones compare phases, which they do before they take whole periods off a delay.
     if fitted.tones.is_empty()
@@ -179,9 +187,49 @@ pub fn calibrate_pooled(
     if channels.iter().all(|channel| channel.offset.is_some_and(|offset| is_near_one(offset.value))) {
         fitted.warnings.push(CalibrationWarning::OffsetBinary);
     }
-    let Fitted { tones, modulus, misfit, frames, warnings, .. } = fitted;
-    let cutoff = settings.fit.cutoff;
-    Ok(Calibration { reference, channels, cutoff, tones, modulus, frames, clipped, misfit, warnings })
+    let Fitted { tones, modulus, misfit, frames, warnings, curves, .. } = fitted;
+    let (cutoff, nonlinearity) = (settings.fit.cutoff, order.map(|_| curves));
+    Ok(Calibration {
+        reference,
+        channels,
+        cutoff,
+        nonlinearity,
+        tones,
+        modulus,
+        frames,
+        clipped,
+        misfit,
+        warnings,
+    })
+}
+
+/// `spec` with other nonlinearities.
+fn with_nonlinearity(spec: &Spec, curves: Vec<Vec<f64>>) -> Spec {
+    let mut new = spec.clone();
+    new.channels.iter_mut().zip(curves).for_each(|(channel, curve)| channel.nonlinearity = curve);
+    new
+}
+
+/// What the signal says.
+fn fitted(
+    model: &ChannelModel,
+    spec: &Spec,
+    acquisitions: &[Acquisition<'_>],
+    signal: &CalibrationSignal,
+    settings: CalibrationSettings,
+) -> Result<Fitted, CalibrateError> {
+    match (signal, acquisitions) {
+        (CalibrationSignal::Tones(frequencies), _) => {
+            tones::fit(model, spec, acquisitions, frequencies, settings)
+        }
+        _ if !spec.layout().is_plain() => Err(CalibrateError::OwnRates),
+        _ if settings.fit.nonlinearity.is_some() => Err(CalibrateError::NonlinearityWithoutTones),
+        (CalibrationSignal::Waveform { samples, spacing }, [Acquisition { records, .. }]) => {
+            waveform::Training::new(model, records, samples, *spacing, settings)?.fit()
+        }
+        (CalibrationSignal::Any, _) => blind::Blind::new(model, acquisitions, usize::MAX)?.fit(settings),
+        _ => Err(CalibrateError::NotPooled { acquisitions: acquisitions.len() }),
+    }
 }
 
 /// The first channel, from 1, whose delay is not determined, with its standard deviation.

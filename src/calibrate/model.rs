@@ -5,9 +5,11 @@ use super::error::CalibrateError;
 use super::fit::{ChannelParameter, FittedValues};
 use crate::analog::{AnalogError, StableFilter, StrictlyProper};
 use crate::linalg::{CMat, Complex};
-use crate::spec::{Band, ChannelSpec, Cutoff, FilterSpec, SignalSpec, Spec};
+use crate::spec::{Band, ChannelSpec, Cutoff, FilterSpec, HALF_WIDTH, SignalSpec, Spec};
 use crate::units::{Hertz, RadiansPerFastPeriod, Seconds};
+use std::cmp::Ordering;
 use std::f64::consts::TAU;
+use std::ops::RangeInclusive;
 
 /// Step of ln(cut-off) for central differences: the error of the difference, its square over six, and the
 /// rounding, eps over it, are both far below a per cent of the slope.
@@ -39,10 +41,12 @@ pub(crate) struct ChannelModel {
     /// o_i.
     pub(super) offsets: Vec<f64>,
     pub(super) front_ends: Vec<StrictlyProper>,
+    /// The standard deviations of ln c_i that the spec states.
+    pub(super) stated_cutoffs: Vec<Option<f64>>,
     /// The stages that c_i scales, if it does not scale the whole front ends.
     stages: Option<Vec<FrontEndStage>>,
-    /// The Nyquist zone of the fast rate, from 0, in which the signal lies.
-    pub(super) fast_zone: usize,
+    /// The frequencies that the signal occupies, cycles per fast period.
+    pub(super) band: RangeInclusive<f64>,
 }
 
 impl ChannelModel {
@@ -61,8 +65,9 @@ impl ChannelModel {
             gains: spec.channels.iter().map(|channel| channel.gain).collect(),
             offsets: spec.channels.iter().map(|channel| channel.offset).collect(),
             front_ends: spec.channels.iter().enumerate().map(realise).collect::<Result<_, _>>()?,
+            stated_cutoffs: (0..spec.channels.len()).map(|i| stated_cutoff(spec, i)).collect(),
             stages: None,
-            fast_zone: fast_zone(spec)?,
+            band: occupied(spec)?,
         })
     }
 
@@ -128,6 +133,26 @@ impl ChannelModel {
         (w + TAU * f64::from(alias)) / self.ratio as f64
     }
 
+    /// The Nyquist zone of the fast rate, from 0, in which the middle of the signal lies.
+    pub(super) fn fast_zone(&self) -> usize {
+        (self.band.start() + self.band.end()).floor().min(MOST_ZONES) as usize
+    }
+
+    /// The `count` aliases k of the slow frequency W that a signal in the band occupies first: those nearest
+    /// to the band, and of those in it the lowest ones.
+    pub(super) fn occupied_aliases(&self, w: f64, count: usize) -> Vec<i32> {
+        let outside = |alias: i32| {
+            let cycles = self.alias(w, alias).abs() / TAU;
+            ((self.band.start() - cycles).max(cycles - self.band.end()).max(0.0), cycles)
+        };
+        let highest = (self.band.start().min(MOST_ZONES) * self.ratio as f64).ceil() as i32;
+        let reach = highest + count as i32;
+        let mut aliases: Vec<i32> = (-reach..=reach).collect();
+        aliases.sort_by(|a, b| outside(*a).partial_cmp(&outside(*b)).unwrap_or(Ordering::Equal));
+        aliases.truncate(count);
+        aliases
+    }
+
     /// A_ik = g_i Phi_i(j nu_k / c_i) e^{-2 pi j k D_i / M}: the phase e^{-j W D_i / M} that all aliases
     /// share is removed from the spectral matrices.
     pub(super) fn steering(&self, point: &ChannelValues, w: f64, aliases: &[i32]) -> CMat {
@@ -167,27 +192,30 @@ fn realised(filter: &FilterSpec, h: Seconds, place: &str) -> Result<StrictlyProp
     StrictlyProper::new(filter, h).map_err(refused)
 }
 
-/// The Nyquist zone of the fast rate, from 0, of the middle of the signal's band; without one of the
+/// The standard deviation of ln c_i, also of the reference.
+fn stated_cutoff(spec: &Spec, i: usize) -> Option<f64> {
+    let half_width = spec.uncertainty.as_ref()?.cutoff.as_ref()?.of(i);
+    (half_width > 0.0).then_some(half_width / HALF_WIDTH)
+}
+
+/// The signal's band in cycles per fast period; without one the Nyquist zone of the fast rate with the
 /// frequency that the target passes best, where it is a band-pass.
-fn fast_zone(spec: &Spec) -> Result<usize, CalibrateError> {
-    let band = spec.signal.as_ref().and_then(SignalSpec::band);
-    let middle = match band {
-        Some(Band { low, high }) => 0.5 * (low + high).per_fast_period(spec.fast_period).0,
-        None => {
-            let target = realised(&spec.target, spec.fast_period, "the target")?;
-            let gain = |w: f64| target.response(RadiansPerFastPeriod(w)).norm();
-            let resonances = target.poles().iter().map(|pole| pole.im.abs());
-            let best = resonances.max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(0.0);
-            if gain(0.0) > LOW_PASS * gain(best) { 0.0 } else { best / TAU }
-        }
-    };
-    Ok((2.0 * middle).floor().min(MOST_ZONES) as usize)
+fn occupied(spec: &Spec) -> Result<RangeInclusive<f64>, CalibrateError> {
+    if let Some(Band { low, high }) = spec.signal.as_ref().and_then(SignalSpec::band) {
+        return Ok(low.per_fast_period(spec.fast_period).0..=high.per_fast_period(spec.fast_period).0);
+    }
+    let target = realised(&spec.target, spec.fast_period, "the target")?;
+    let gain = |w: f64| target.response(RadiansPerFastPeriod(w)).norm();
+    let resonances = target.poles().iter().map(|pole| pole.im.abs());
+    let best = resonances.max_by(|a, b| gain(*a).total_cmp(&gain(*b))).unwrap_or(0.0);
+    let zone = if gain(0.0) > LOW_PASS * gain(best) { 0.0 } else { (2.0 * best / TAU).floor() };
+    Ok(0.5 * zone..=0.5 * (zone + 1.0))
 }
 
 /// One fitted parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Parameter {
-    /// From 0; never the reference.
+    /// From 0; the reference only with its cut-off.
     pub(super) channel: usize,
     pub(super) kind: ChannelParameter,
 }
@@ -230,6 +258,15 @@ impl ChannelValues {
                 ChannelParameter::Cutoff => &mut self.ln_cutoffs,
             };
             values[parameter.channel] += step;
+        }
+    }
+
+    /// The value of a parameter.
+    pub(super) fn value(&self, Parameter { channel, kind }: Parameter) -> f64 {
+        match kind {
+            ChannelParameter::Delay => self.delays[channel],
+            ChannelParameter::Gain => self.ln_gains[channel],
+            ChannelParameter::Cutoff => self.ln_cutoffs[channel],
         }
     }
 

@@ -1,6 +1,7 @@
 //! The captured samples of one channel.
 
 use crate::sine_fit::Channel;
+use crate::spec::{ChannelSpec, Spec};
 use std::ops::Range;
 
 /// Least share of equal samples in two records of the same recording.
@@ -93,6 +94,13 @@ impl Record {
         Self { samples: self.samples[part].to_vec(), imaginary, keep, clipped: self.clipped }
     }
 
+    /// The samples without a static nonlinearity of the converter.
+    pub(super) fn straightened(&self, channel: &ChannelSpec) -> Self {
+        let straight = |part: &Vec<f64>| part.iter().map(|&x| channel.straightened(x)).collect();
+        let imaginary = self.imaginary.as_ref().map(straight);
+        Self { samples: straight(&self.samples), imaginary, keep: self.keep.clone(), clipped: self.clipped }
+    }
+
     /// Samples that are not clipped and finite.
     pub fn used(&self) -> usize {
         self.keep.iter().filter(|&&keep| keep).count()
@@ -106,6 +114,14 @@ impl Record {
         let changes = self.samples.windows(2).any(|pair| pair[0] != pair[1]);
         length > 16 && changes && equal as f64 >= SAME_SAMPLES_SHARE * length as f64
     }
+}
+
+/// The records without the nonlinearities that the spec has.
+pub(super) fn straightened(spec: &Spec, records: &[Record]) -> Vec<Record> {
+    let of_converter = |(channel, range): (&ChannelSpec, Range<usize>)| {
+        records[range].iter().map(|record| record.straightened(channel)).collect::<Vec<_>>()
+    };
+    spec.channels.iter().zip(spec.layout().ranges()).flat_map(of_converter).collect()
 }
 
 /// The first and the longest run of frames that every record has, as first frame and length.

@@ -40,6 +40,15 @@ pub enum CalibrationWarning {
         /// By how much the delay of the channel most affected changes per per cent of cut-off.
         delay: FastPeriods,
     },
+    /// The cut-offs are relative to one that the tones do not tell.
+    #[error(
+        "the cut-offs are relative to that of channel {reference}, which the tones do not tell and which keeps the value \
+         of the spec; if it is uncertain, state `cutoff` in `[uncertainty]`, and the intervals of the others include it"
+    )]
+    CutoffsRelative {
+        /// From 1.
+        reference: usize,
+    },
     /// The tones contradict each other by more than their noise, so all intervals were widened.
     #[error(
         "the tones contradict each other {misfit:.1} times as much as their noise explains, and the intervals were \
@@ -74,15 +83,26 @@ pub enum CalibrationWarning {
         /// The same without it.
         others: f64,
     },
-    /// The lower and the upper half of the frequencies contradict each other by more than their noise.
+    /// The captures of any signal differ from the model by more than their noise.
     #[error(
-        "low and high frequencies contradict each other {misfit:.1} times as much as their noise explains, and the \
-         intervals were widened by that; the front ends may differ from those of the spec, or aliases be occupied \
-         that the fit takes for noise"
+        "the captures differ from the model {misfit:.1} times as much as their noise explains, and the intervals were \
+         widened by that; the front ends may differ from those of the spec, the signal may reach beyond its `band`, \
+         or the captures began at different times"
     )]
     BandsDisagree {
         /// The factor by which the intervals were widened.
         misfit: f64,
+    },
+    /// The signal has power at multiples of the slow rate, where it looks like offsets.
+    #[error(
+        "the signal reaches over multiples of the slow rate, which fold onto 0 Hz, and hides the offsets: they are \
+         known to {half_width:.1e} of full scale, and noise alone would leave {noise:.1e}; tones tell them better"
+    )]
+    OffsetsHidden {
+        /// The largest half-width of the offsets.
+        half_width: f64,
+        /// What the noise alone would leave.
+        noise: f64,
     },
     /// What the waveform leaves is not white noise.
     #[error(
@@ -149,7 +169,15 @@ pub enum CalibrationWarning {
 impl CalibrationWarning {
     /// Whether it only says what the estimates mean; the others say that they are doubtful.
     pub fn is_note(&self) -> bool {
-        matches!(self, Self::CutoffAssumed { .. } | Self::HarmonicsLeftOut { .. } | Self::Shifted { .. })
+        use CalibrationWarning as Warning;
+        matches!(
+            self,
+            Warning::CutoffAssumed { .. }
+                | Warning::CutoffsRelative { .. }
+                | Warning::HarmonicsLeftOut { .. }
+                | Warning::OffsetsHidden { .. }
+                | Warning::Shifted { .. }
+        )
     }
 }
 

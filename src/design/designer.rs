@@ -183,6 +183,7 @@ fn judge(spec: &Spec, sizing: Sizing, realised: Realised, synthesis: &Synthesis)
         delays: spec.channels.iter().map(|channel| channel.delay).collect(),
         gains: spec.channels.iter().map(|channel| channel.gain).collect(),
         offsets: spec.channels.iter().map(|channel| channel.offset).collect(),
+        nonlinearity: spec.channels.iter().map(|channel| channel.nonlinearity.clone()).collect(),
         filters,
         gamma: Gamma::computed(peak.gain, norm_error, synthesis.lower, synthesis.noncausal),
         proof: None,

@@ -1,6 +1,7 @@
 //! Integer taps on integer samples, with the words of hardware.
 
 use super::ExportError;
+use super::error::check_straight;
 use super::layout::PolyphaseTaps;
 use crate::bank::{Bank, FixedPoint};
 
@@ -196,6 +197,7 @@ impl IntegerFilters {
     /// # Errors
     /// [`ExportError::Offset`] without these bits, and [`ExportError::Words`].
     pub(super) fn new(bank: &Bank, words: &FixedPoint, input_bits: Option<u32>) -> Result<Self, ExportError> {
+        check_straight(bank)?;
         let nonzero = |(_, offset): &(usize, &f64)| **offset != 0.0;
         let full_scale = match (input_bits, bank.offsets.iter().enumerate().find(nonzero)) {
             (None, Some((i, &offset))) => return Err(ExportError::Offset { channel: i + 1, offset }),

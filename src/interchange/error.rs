@@ -1,5 +1,6 @@
 //! Why a bank cannot be exported.
 
+use crate::bank::Bank;
 use crate::messages::Quoted;
 
 /// A format that cannot hold a bank.
@@ -21,6 +22,15 @@ pub enum ExportError {
         given: u32,
         /// At most so many.
         most: u32,
+    },
+    /// The bank corrects a nonlinearity, for which no format has a place.
+    #[error(
+        "channel {channel} has a nonlinearity, which only `fuse`, `stream`, Python and the C library correct; take it \
+         out of the spec, design the bank again, and correct the samples before the filters"
+    )]
+    Nonlinearity {
+        /// Number of the channel, from 1.
+        channel: usize,
     },
     /// Integer code needs the full scale to which an offset is relative.
     #[error(
@@ -106,4 +116,12 @@ pub enum ExportError {
         /// Its columns.
         columns: usize,
     },
+}
+
+/// Refuses a bank that corrects nonlinearities.
+pub(super) fn check_straight(bank: &Bank) -> Result<(), ExportError> {
+    match bank.nonlinearity.iter().position(|curve| !curve.is_empty()) {
+        Some(i) => Err(ExportError::Nonlinearity { channel: i + 1 }),
+        None => Ok(()),
+    }
 }

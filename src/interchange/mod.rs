@@ -34,6 +34,7 @@ mod verilog;
 
 pub use bit_true::{BitTrue, WordSizes};
 pub use error::ExportError;
+use error::check_straight;
 pub use layout::{PolyphaseTaps, sparse_rows};
 pub use read_taps::{TapsError, taps_of_csv, taps_of_npy};
 pub use sections::{Section, block_of_sections, sections};
@@ -73,6 +74,7 @@ pub fn export(
     name: &str,
     input_bits: Option<u32>,
 ) -> Result<Vec<u8>, ExportError> {
+    check_straight(bank)?;
     let is_code = matches!(format, Format::C99 | Format::Coe | Format::Mem | Format::Verilog);
     if input_bits.is_some() && !(is_code && bank.fixed_point.is_some()) {
         return Err(ExportError::NoWords);

@@ -66,6 +66,8 @@ pub enum Cause {
     },
     /// None of the others.
     Unknown,
+    /// No line: the largest bin of what is left, where no line is as large.
+    Noise,
 }
 
 impl Cause {
@@ -93,6 +95,7 @@ impl fmt::Display for Cause {
                 write!(f, "intermodulation, {a} {} {b:+} {}", name(first), name(second))
             }
             Self::Unknown => write!(f, "unknown"),
+            Self::Noise => write!(f, "largest bin of the noise, which decides SFDR"),
         }
     }
 }

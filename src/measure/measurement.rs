@@ -4,14 +4,17 @@ use super::expected::{Expected, Pattern};
 use super::lines::{FoundLine, Lines, fit_lines};
 use super::record::{Quadrature, RecordParts, UnsettledEnds};
 use super::{Cause, MeasureError, RecordSpectrum, Settings, Window};
+use crate::runtime::nonlinearity;
 use crate::sine_fit::SineFitError::{AtEdge, NoTone, TonesCoincide};
-use crate::sine_fit::{Estimate, Sense, SineFit, ToneFit, find_tones, fit, locate, with_lines};
+use crate::sine_fit::{CurveFit, Estimate, Sense, SineFit, ToneFit, find_tones, fit, locate, with_lines};
 use crate::units::{Decibels, Hertz, Radians};
 
 /// A tone that is given may be this far from the true one, in cycles per sample ..
 const NEAR_CYCLES: f64 = 1e-3;
 /// .. and at least so many cycles per record.
 const NEAR_BINS: f64 = 5.0;
+/// Parts of a record, each of which a nonlinearity of the others is judged by.
+const CURVE_PARTS: usize = 8;
 
 /// The figures of a record. Decibels of a power or an amplitude that is 0 are infinite.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -50,6 +53,10 @@ pub struct Measurement {
     /// Harmonics 2 .. H over signal.
     #[serde(rename = "thd_db")]
     pub thd: Decibels,
+    /// The same without the static nonlinearity of the converters that the record shows: a curve of the order
+    /// H for each. `None` for complex records, and where no curve lowers what the tones leave.
+    #[serde(rename = "thd_straightened_db", skip_serializing_if = "Option::is_none")]
+    pub thd_straightened: Option<Decibels>,
     /// H.
     pub harmonics: usize,
     /// Interleaving spurs over signal; `None` for a single converter.
@@ -170,6 +177,55 @@ fn measured(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Resul
 
 fn figures(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Result<Measurement, MeasureError> {
     let tones = fit_tones(record, rate, settings)?;
+    let mut found = figures_of(record, &tones, settings)?;
+    let again = |record: &RecordParts<'_>| {
+        let tones = fit_tones(record, rate, settings)?;
+        figures_of(record, &tones, settings)
+    };
+    // What has not settled leaks into all lines and is none of them.
+    if let Some(ends) = found.unsettled_ends
+        && let Ok(settled) = again(&record.without_ends(ends.samples))
+    {
+        (found.sfdr, found.spurs) = (settled.sfdr, settled.spurs);
+        found.sfdr_without_interleaving = settled.sfdr_without_interleaving;
+    }
+    let straight = straightened(record, &tones, settings).and_then(|straight| again(&straight).ok());
+    found.thd_straightened = straight.map(|straight| straight.thd);
+    Ok(found)
+}
+
+/// The record without the nonlinearities that it shows of its converters, if there are any.
+fn straightened(
+    record: &RecordParts<'_>,
+    tones: &SineFit,
+    settings: &Settings,
+) -> Option<RecordParts<'static>> {
+    let Settings { converters, harmonics, full_scale, .. } = *settings;
+    let [samples] = record.parts() else { return None };
+    let left = tones.residual(0, samples);
+    let curve = |converter: usize| {
+        let mut fit = CurveFit::new(harmonics);
+        let length = samples.len().div_ceil(CURVE_PARTS);
+        for first in (0..samples.len()).step_by(length) {
+            let part = (first..samples.len().min(first + length)).filter(|n| n % converters == converter);
+            let kept = part.filter(|&n| samples[n].is_finite());
+            fit.add(kept.map(|n| (samples[n] / full_scale, left[n] / full_scale)));
+        }
+        fit.curve()
+    };
+    let curves: Vec<Vec<f64>> = (0..converters).map(curve).collect();
+    let straight =
+        |(n, x): (usize, &f64)| x - full_scale * nonlinearity(&curves[n % converters], x / full_scale);
+    let is_bent = curves.iter().any(|curve| !curve.is_empty());
+    is_bent.then(|| record.map(|_, part| part.iter().enumerate().map(straight).collect()))
+}
+
+fn figures_of(
+    record: &RecordParts<'_>,
+    tones: &SineFit,
+    settings: &Settings,
+) -> Result<Measurement, MeasureError> {
+    let rate = tones.rate;
     let cycles: Vec<f64> = tones.frequencies.iter().map(|f| f.value / rate).collect();
     let pattern = Pattern {
         tones: &cycles,
@@ -179,9 +235,9 @@ fn figures(record: &RecordParts<'_>, rate: Hertz, settings: &Settings) -> Result
         resolution: 1.0 / record.len() as f64,
     };
     let expected = Expected::of(&pattern);
-    let lines = fit_lines(record, &tones, &expected, &pattern)?;
+    let lines = fit_lines(record, tones, &expected, &pattern)?;
     let rest = spectrum(&lines.rest, rate, settings.window);
-    Ok(FigureSources { record, pattern: &pattern, tones: &tones, lines: &lines, rest, settings }
+    Ok(FigureSources { record, pattern: &pattern, tones, lines: &lines, rest, settings }
         .assemble(expected.hidden))
 }
 
@@ -255,6 +311,7 @@ impl FigureSources<'_> {
             enob_full_scale: enob + 0.5 * (0.5 * full_scale * full_scale / signal).log2(),
             snr: Decibels::of_power(signal / self.lines.noise_power),
             thd: total(&|cause| matches!(cause, Cause::Harmonic { .. })),
+            thd_straightened: None,
             harmonics,
             interleaving: is_turned.then(|| total(&|cause| cause.is_interleaving())),
             sfdr: self.sfdr(|_| true),
@@ -320,7 +377,7 @@ impl FigureSources<'_> {
 
     /// The largest tone over the largest line that counts, or the largest bin of the rest.
     fn sfdr(&self, counts: impl Fn(&FoundLine) -> bool) -> Decibels {
-        let floor = self.rest.largest();
+        let (_, floor) = self.rest.largest();
         let counted = self.lines.found.iter().filter(|line| counts(line));
         let largest = counted.fold(floor, |most, line| most.max(line.amplitude));
         Decibels::of_amplitude(self.largest_tone() / largest)
@@ -340,10 +397,14 @@ impl FigureSources<'_> {
             frequency: line.frequency,
             amplitude: line.amplitude,
             level: Decibels::of_amplitude(line.amplitude / largest),
-            above_noise: line.amplitude > self.lines.threshold,
+            above_noise: line.amplitude > self.lines.threshold && line.causes != [Cause::Noise],
             causes: line.causes.clone(),
         };
+        let (frequency, amplitude) = self.rest.largest();
         let mut spurs: Vec<Spur> = self.lines.found.iter().map(spur).collect();
+        if spurs.iter().all(|spur| spur.amplitude < amplitude) {
+            spurs.push(spur(&FoundLine { frequency, amplitude, causes: vec![Cause::Noise] }));
+        }
         spurs.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude));
         spurs
     }

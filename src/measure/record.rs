@@ -63,6 +63,11 @@ impl<'a> RecordParts<'a> {
         RecordParts { parts: parts.map(|(i, part)| Cow::Owned(change(i, part))).collect() }
     }
 
+    /// Without so many samples at either end.
+    pub(super) fn without_ends(&self, samples: usize) -> RecordParts<'static> {
+        self.map(|_, part| part[samples..part.len() - samples].to_vec())
+    }
+
     /// With zeros in place of missing samples.
     pub(super) fn filled(&self) -> RecordParts<'static> {
         self.map(|_, part| part.iter().map(|x| if x.is_finite() { *x } else { 0.0 }).collect())

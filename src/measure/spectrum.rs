@@ -128,11 +128,12 @@ impl RecordSpectrum {
         bins.iter().map(|a| 0.5 * a * a).sum::<f64>() / self.window.noise_bandwidth()
     }
 
-    /// The largest amplitude of bins beyond the main lobe of the constant.
-    pub fn largest(&self) -> f64 {
+    /// The largest bin beyond the main lobe of the constant: its frequency and amplitude.
+    pub fn largest(&self) -> (Hertz, f64) {
         let lobe = self.window.coefficients().len();
         let beyond = self.amplitudes.iter().enumerate().filter(|(k, _)| k.abs_diff(self.negative) >= lobe);
-        beyond.fold(0.0, |most, (_, a)| most.max(*a))
+        let (at, largest) = beyond.fold((0, 0.0), |most, (k, &a)| if a > most.1 { (k, a) } else { most });
+        (self.frequency(at), largest)
     }
 
     /// Mean noise density in squared units of the samples per hertz: the mean of A_k^2 / 2 over the bins,

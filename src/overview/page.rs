@@ -137,7 +137,11 @@ fn spurs_before_after(measured: &BeforeAfter) -> String {
         format!("{:.2} dBc{noise}", spur.level.0)
     };
     let same = |spur: &Spur| after.spurs.iter().find(|other| other.causes == spur.causes);
-    let spurs = before.spurs.iter().filter(|spur| spur.causes != [Cause::Unknown]).take(MOST_SPURS);
+    let spurs = before
+        .spurs
+        .iter()
+        .filter(|spur| !matches!(spur.causes[..], [Cause::Unknown | Cause::Noise]))
+        .take(MOST_SPURS);
     let mut rows = headings(&["spur", "frequency", "interleaved", "fused", ""]);
     for spur in spurs {
         let frequency = readable(spur.frequency.0, "Hz");

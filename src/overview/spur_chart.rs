@@ -160,7 +160,7 @@ fn kind(spur: &Spur) -> (&'static str, [u8; 3]) {
         Some(Cause::HarmonicImage { .. }) => ("harmonic, displaced", [140, 86, 75]),
         Some(Cause::Image { .. }) => ("image", [227, 119, 194]),
         Some(Cause::Intermodulation { .. }) => ("intermodulation", [23, 190, 207]),
-        Some(Cause::Unknown) | None => ("unknown", [127, 127, 127]),
+        Some(Cause::Unknown | Cause::Noise) | None => ("unknown", [127, 127, 127]),
     }
 }
 

@@ -141,12 +141,12 @@ impl FigureTerms<'_> {
     fn image(&self) -> Fact {
         match (self.figures.image, self.figures.setup) {
             (Some(_), Setup { ratio: 1, channels: 1, .. }) => {
-                fact("image", "none", "one channel at the output rate has no images")
+                fact("SFDR", "none", "one channel at the output rate has no images")
             }
             (Some(_), Setup { ratio: 1, .. }) => {
-                fact("image", "none", "channels at the output rate have no images")
+                fact("SFDR", "none", "channels at the output rate have no images")
             }
-            (figure, _) => self.tone("image", figure, "largest image of a tone"),
+            (figure, _) => self.tone("SFDR", figure, "to the largest image of a tone"),
         }
     }
 
@@ -164,7 +164,12 @@ impl FigureTerms<'_> {
             return fact(name, "none", meaning);
         }
         let (band, uncertainty) = (self.band(), self.uncertainty_of_tones());
-        fact(name, rounded(db), format!("{what} in {band}, at {}{uncertainty}{left_out}", self.hertz(hertz)))
+        let shown = if name == "SFDR" { -db } else { db };
+        fact(
+            name,
+            rounded(shown),
+            format!("{what} in {band}, at {}{uncertainty}{left_out}", self.hertz(hertz)),
+        )
     }
 
     /// The bank beside the best simple way, and the other ways.
@@ -260,7 +265,7 @@ mod tests {
             lines(&figures(132.94, 48.0)),
             [
                 "SNR: 132.9 dB, for white noise in 0 to 9 kHz; 89.0 dB with 16-bit converters",
-                "image: -98.8 dB, largest image of a tone in 0 to 9 kHz, at 8.5 kHz",
+                "SFDR: 98.8 dB, to the largest image of a tone in 0 to 9 kHz, at 8.5 kHz",
                 "gain error: none, below the rounding of double precision in 0 to 9 kHz",
                 "compared: +41.0 dB, over a cubic spline (48.0 dB); channel 2 alone at best \
                  (20.0 dB); all with 16-bit converters",

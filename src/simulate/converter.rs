@@ -4,20 +4,25 @@ use super::capture::{Analog, target};
 use super::normal::{Normal, Purpose};
 use super::response::Instants;
 use crate::design::Problem;
+use crate::runtime::nonlinearity;
 use crate::units::FastPeriods;
 use std::ops::Range;
+
+/// Steps to the sample of a converter with a nonlinearity: its last digit.
+const BENDING_STEPS: usize = 16;
 
 /// How a converter differs from the ideal sampler of a channel. Sample k of channel i, with the front end
 /// Phi_i and the gain g_i of the problem, is
 ///
 /// ```text
-/// q(level g_i (1 + gain error) (phi_i * f)(t_k) + offset + noise n_k)
+/// q(e(level g_i (1 + gain error) (phi_i * f)(t_k) + offset + noise n_k))
 /// t_k = k T_i / (1 + drift) - D_i - delay error + jitter j_k
 /// ```
 ///
-/// with independent normal numbers n_k and j_k of variance 1 and the quantiser q. The numbers depend on the
+/// with independent normal numbers n_k and j_k of variance 1, the quantiser q, and e(x) the sample y of which
+/// y - sum of a_k T_k(y) is x. The numbers depend on the
 /// seed, the channel and k only.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Sampler {
     /// The true delay minus D_i.
     pub delay_error: FastPeriods,
@@ -25,6 +30,8 @@ pub struct Sampler {
     pub gain_error: f64,
     /// What is added to each sample, relative to full scale.
     pub offset: f64,
+    /// a_2, a_3, .. of the static nonlinearity.
+    pub nonlinearity: Vec<f64>,
     /// By how much the clock is too fast, relatively.
     pub drift: f64,
     /// Rms of the aperture jitter.
@@ -59,6 +66,7 @@ impl Sampler {
             delay_error: FastPeriods(0.0),
             gain_error: 0.0,
             offset: 0.0,
+            nonlinearity: Vec::new(),
             drift: 0.0,
             jitter: FastPeriods(0.0),
             noise: 0.0,
@@ -122,6 +130,9 @@ impl Sampler {
             if self.noise > 0.0 {
                 *x += self.noise * normal.at(k);
             }
+            if !self.nonlinearity.is_empty() {
+                *x = bent(&self.nonlinearity, *x);
+            }
             if let Some(quantiser) = self.quantiser {
                 let (code, saturated) = quantiser.quantise(*x);
                 *x = code;
@@ -130,6 +141,12 @@ impl Sampler {
         }
         Delivered { samples, imaginary: None, clipped }
     }
+}
+
+/// The y of which y less its nonlinearity is x. A step errs by what the slope of the curve leaves of the one
+/// before, a tenth at most.
+fn bent(coefficients: &[f64], x: f64) -> f64 {
+    (0..BENDING_STEPS).fold(x, |y, _| x + nonlinearity(coefficients, y))
 }
 
 /// The instants of the samples of a converter, whose `samples` per frame these are, on its own time axis.
@@ -322,13 +339,13 @@ mod tests {
     #[test]
     fn samples_depend_on_seed_channel_and_number_only() {
         let converter = Sampler { jitter: FastPeriods(0.01), noise: 0.1, seed: 3, ..Sampler::ideal() };
-        let capture = |converter: Sampler, channel, periods| {
+        let capture = |converter: &Sampler, channel, periods| {
             converter.capture(&problem(), channel, &tone(0.4), 1.0, periods).samples
         };
-        let long = capture(converter, 1, 500);
-        assert_eq!(capture(converter, 1, 200), long[..200]);
-        assert_ne!(capture(Sampler { seed: 4, ..converter }, 1, 200), long[..200]);
-        assert_ne!(capture(converter, 0, 200), long[..200]);
+        let long = capture(&converter, 1, 500);
+        assert_eq!(capture(&converter, 1, 200), long[..200]);
+        assert_ne!(capture(&Sampler { seed: 4, ..converter.clone() }, 1, 200), long[..200]);
+        assert_ne!(capture(&converter, 0, 200), long[..200]);
     }
 
     #[test]

@@ -69,11 +69,11 @@ pub struct ErrorsOfConverter {
 }
 
 /// A converter with its errors.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct VirtualConverter {
     /// What was asked for.
     pub errors: ErrorsOfConverter,
-    /// The converter, with the offset of the spec.
+    /// The converter, with the offset and the nonlinearity of the spec.
     pub converter: Sampler,
 }
 
@@ -167,6 +167,7 @@ impl ErrorLists {
                 delay_error: Seconds(delays[i]).in_fast_periods(spec.fast_period),
                 gain_error: gains[i],
                 offset: channel.offset + offsets[i],
+                nonlinearity: channel.nonlinearity.clone(),
                 drift: drift[i] * 1e-6,
                 jitter: jitter.in_fast_periods(spec.fast_period),
                 noise: self.noise,

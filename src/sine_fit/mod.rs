@@ -37,6 +37,7 @@
 
 mod error;
 mod gauss_newton;
+mod nonlinearity;
 mod normal;
 mod result;
 mod search;
@@ -45,20 +46,40 @@ mod tests;
 
 pub use error::SineFitError;
 pub use gauss_newton::{fit, fit_known};
+pub use nonlinearity::CurveFit;
 pub(crate) use result::wrapped;
 pub use result::{ChannelFit, ComplexChannel, Component, Ratio, Sense, SineFit, ToneFit};
 pub(crate) use search::with_lines;
 pub use search::{find_tones, locate};
 
+use crate::spec::HALF_WIDTH;
 use crate::units::Seconds;
+use serde::ser::{Serialize, SerializeStruct, Serializer};
+use std::ops::Mul;
 
-/// An estimate with its standard deviation, in one unit.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+/// An estimate with its standard deviation, in one unit. Reports have the half-width of its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate<Q> {
     /// The value.
     pub value: Q,
     /// The standard deviation.
     pub sigma: Q,
+}
+
+impl<Q: Copy + Mul<f64, Output = Q>> Estimate<Q> {
+    /// The half-width of the 95 % interval.
+    pub fn half_width(&self) -> Q {
+        self.sigma * HALF_WIDTH
+    }
+}
+
+impl<Q: Serialize + Copy + Mul<f64, Output = Q>> Serialize for Estimate<Q> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut interval = serializer.serialize_struct("Estimate", 2)?;
+        interval.serialize_field("value", &self.value)?;
+        interval.serialize_field("half_width", &self.half_width())?;
+        interval.end()
+    }
 }
 
 /// The record of one converter.

@@ -212,6 +212,24 @@ impl SineFit {
         residual
     }
 
+    /// The slope of the fitted sines at the first `count` samples of channel `channel` (from 0), per sample.
+    ///
+    /// # Panics
+    /// If there is no such channel.
+    pub fn slopes(&self, channel: usize, count: usize) -> Vec<f64> {
+        let (mut cosines, mut sines) = (vec![0.0; BLOCK], vec![0.0; BLOCK]);
+        let mut slopes = vec![0.0; count];
+        for (k, &cycles) in self.cycles.iter().enumerate() {
+            let ([a, b], oscillator) = (self.coefficients(channel, k), Oscillator::new(cycles));
+            for (number, block) in slopes.chunks_mut(BLOCK).enumerate() {
+                oscillator.fill((number * BLOCK) as f64 - self.centres[channel], &mut cosines, &mut sines);
+                let waves = cosines.iter().zip(&sines);
+                block.iter_mut().zip(waves).for_each(|(v, (c, s))| *v += TAU * cycles * (b * c - a * s));
+            }
+        }
+        slopes
+    }
+
     /// Amplitude and phase of tone `tone` (from 0).
     ///
     /// # Panics

@@ -32,6 +32,7 @@ mod lost;
 mod measure;
 mod merge;
 mod messages;
+mod nonlinearity;
 mod notes;
 #[cfg(unix)]
 mod outputs;

@@ -3,7 +3,8 @@
 use crate::messages::Number;
 use crate::spec::{
     At, FrameSample, MAX_CHANNELS, MAX_ENTRY, Refusal, Spec, SpecProblem, check_channel_count,
-    check_fast_period, check_fraction_bits, check_gain, check_offset, check_ratio, refused, within,
+    check_fast_period, check_fraction_bits, check_gain, check_nonlinearity, check_offset, check_ratio,
+    refused, within,
 };
 use crate::units::Seconds;
 
@@ -52,6 +53,12 @@ impl Bank {
         self.check_samples()?;
         check_converters("gain", &self.gains, self.channel_count(), check_gain)?;
         check_converters("offset", &self.offsets, self.channel_count(), check_offset)?;
+        let count = self.nonlinearity.len();
+        check_length("channels", count, self.channel_count(), "nonlinearities", "every channel has a list")?;
+        for (i, curve) in self.nonlinearity.iter().enumerate() {
+            let refused = check_nonlinearity(curve).at("nonlinearity");
+            refused.map_err(|error| error.inside(&format!("channels[{i}]")))?;
+        }
         check_gamma(&self.gamma)?;
         self.check_method()?;
         match &self.filters {
@@ -190,6 +197,10 @@ impl Bank {
             agree(&path("delay"), delay.0, channel.delay.0, self.fast_period.0 + delay.0.abs())?;
             agree(&path("gain"), self.gains[i], channel.gain, channel.gain.abs())?;
             agree(&path("offset"), self.offsets[i], channel.offset, channel.offset.abs())?;
+            let (own, other) = (&self.nonlinearity[i], &channel.nonlinearity);
+            let rule = "the spec must have the nonlinearity of the bank";
+            check_length(&path("nonlinearity"), own.len(), other.len(), "coefficients", rule)?;
+            own.iter().zip(other).try_for_each(|(a, b)| agree(&path("nonlinearity"), *a, *b, b.abs()))?;
         }
         match (&self.fixed_point, &spec.design.bits) {
             // Of a loss they are the most.

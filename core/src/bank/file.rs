@@ -49,6 +49,8 @@ struct ConverterTable {
     gain: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     offset: Option<f64>,
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    nonlinearity: Vec<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     taps: Option<TapLists>,
 }
@@ -129,6 +131,7 @@ impl Bank {
             samples: (self.samples[i] != 1).then_some(self.samples[i]),
             gain: unless(self.gains[i], 1.0),
             offset: unless(self.offsets[i], 0.0),
+            nonlinearity: self.nonlinearity[i].clone(),
             taps: self.taps_of(i),
         };
         BankTable {
@@ -225,6 +228,7 @@ impl BankTable<SpecTable> {
             delays: self.channels.iter().map(|channel| Seconds(channel.delay)).collect(),
             gains: of_channels(|channel| channel.gain.unwrap_or(1.0)),
             offsets: of_channels(|channel| channel.offset.unwrap_or(0.0)),
+            nonlinearity: self.channels.iter().map(|channel| channel.nonlinearity.clone()).collect(),
             filters: filters(self.state_space, self.channels)?,
             fixed_point: self.fixed_point,
             gamma: self.gamma.unwrap_or_default(),

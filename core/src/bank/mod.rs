@@ -56,6 +56,9 @@ pub struct Bank {
     /// The offset o_i of each converter, relative to full scale. It is subtracted from the samples before
     /// the filters.
     pub offsets: Vec<f64>,
+    /// The static nonlinearity of each converter: a_k from k = 2 on of the sum of a_k T_k(x) that its sample x
+    /// contains, which is subtracted before the filters.
+    pub nonlinearity: Vec<Vec<f64>>,
     /// The synthesis filters, one for each sample of a frame.
     pub filters: SynthesisFilters,
     /// The integers of the taps, if the taps are fixed-point numbers.
@@ -140,6 +143,7 @@ impl Bank {
             delays: vec![Seconds(0.0); channels],
             gains: vec![1.0; channels],
             offsets: vec![0.0; channels],
+            nonlinearity: vec![Vec::new(); channels],
             filters,
             fixed_point: None,
             gamma: Gamma::default(),
@@ -227,7 +231,7 @@ impl Bank {
     }
 
     /// Compiles the bank into a plan, which any number of streams of the runtime may share. Its streams
-    /// subtract the offsets of the converters.
+    /// subtract the nonlinearities and offsets of the converters.
     ///
     /// # Errors
     /// [`BuildError`] if the bank's parts do not fit together, hold values that are not finite, or cannot
@@ -246,7 +250,21 @@ impl Bank {
                 options,
             ),
         };
-        plan?.with_offsets(&self.layout().each(&self.offsets))
+        let layout = self.layout();
+        plan?.with_corrections(&layout.each(&self.offsets), &self.corrected_curves())
+    }
+
+    /// The nonlinearity of each sample of a frame; nothing if no converter has one.
+    fn corrected_curves(&self) -> Vec<Vec<f64>> {
+        match self.is_straight() {
+            true => Vec::new(),
+            false => self.layout().each(&self.nonlinearity),
+        }
+    }
+
+    /// Whether no converter has a nonlinearity that is corrected.
+    pub fn is_straight(&self) -> bool {
+        self.nonlinearity.iter().all(Vec::is_empty)
     }
 }
 

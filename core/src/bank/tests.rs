@@ -23,6 +23,7 @@ fn fir() -> Bank {
         delays: vec![Seconds(1.2), Seconds(0.6)],
         gains: vec![1.0; 2],
         offsets: vec![0.0; 2],
+        nonlinearity: vec![Vec::new(); 2],
         filters: SynthesisFilters::Fir(vec![vec![0.1, -2.5e-9, 1.0 / 3.0], vec![5e-324, -0.0, 1.7e149]]),
         gamma: Gamma { upper: Some(0.0399320), noncausal: Some(0.03), ..Gamma::default() },
         proof: None,

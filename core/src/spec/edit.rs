@@ -95,6 +95,9 @@ impl ChannelSpec {
                 set(table, key, number(new));
             }
         }
+        if self.nonlinearity != old.nonlinearity {
+            set(table, "nonlinearity", self.nonlinearity.iter().copied().map(number).collect());
+        }
         if self.filter != old.filter {
             set(table, "filter", inline(&self.filter)?);
         }

@@ -185,6 +185,20 @@ pub(crate) fn check_gain(gain: f64) -> Result<(), SpecProblem> {
     Err(range(gain, "(factor)", rule))
 }
 
+/// Most coefficients of a nonlinearity: beyond them the polynomial follows single codes.
+const MAX_NONLINEARITY: usize = 31;
+
+/// a_k: a curve that moves samples by more than a tenth of full scale is no error of a converter.
+///
+/// # Errors
+/// [`SpecProblem`] for too many coefficients, or one that is too large.
+pub fn check_nonlinearity(coefficients: &[f64]) -> Result<(), SpecProblem> {
+    let rule = format!("give the coefficients of T_2, T_3, .., at most {MAX_NONLINEARITY} of them");
+    within(coefficients.len() as f64, 0.0..=MAX_NONLINEARITY as f64, "coefficients", rule)?;
+    let rule = "a coefficient is relative to full scale, -0.1 to 0.1; of 12 bits half a step is 0.00024";
+    coefficients.iter().try_for_each(|&a| within(a, -0.1..=0.1, "of full scale", rule))
+}
+
 /// o_i: a converter whose offset exceeds full scale delivers nothing but clipped samples.
 ///
 /// # Errors

@@ -40,7 +40,7 @@ pub use frames::{FrameLayout, FrameSample};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS};
 pub(crate) use limits::{MAX_ENTRY, check_channel_count, check_fast_period, check_gain, check_ratio};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES, MAX_TARGET_DB};
-pub use limits::{check_noise, check_offset, within};
+pub use limits::{check_noise, check_nonlinearity, check_offset, within};
 pub use one_or_each::OneOrEach;
 pub use passband::Passband;
 pub(crate) use reading::refusal;
@@ -123,10 +123,14 @@ pub struct ChannelSpec {
     /// o_i: the converter's offset, relative to full scale.
     #[serde(skip_serializing_if = "is_zero")]
     pub offset: f64,
+    /// a_k from k = 2 on: a sample x also contains the sum of a_k T_k(x), with Chebyshev's polynomials, which
+    /// is subtracted before anything else.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub nonlinearity: Vec<f64>,
 }
 
 impl ChannelSpec {
-    /// A converter without noise, gain error and offset.
+    /// A converter without noise, gain error, offset and nonlinearity.
     pub fn new(delay: Seconds, filter: FilterSpec) -> Self {
         Self {
             delay,
@@ -137,6 +141,7 @@ impl ChannelSpec {
             jitter: Seconds(0.0),
             gain: 1.0,
             offset: 0.0,
+            nonlinearity: Vec::new(),
         }
     }
 
@@ -148,7 +153,13 @@ impl ChannelSpec {
         self.bits.map_or(Ok(()), limits::check_converter_bits).at("bits")?;
         limits::check_jitter(self.jitter.in_fast_periods(h), self.jitter.0).at("jitter")?;
         check_gain(self.gain).at("gain")?;
-        check_offset(self.offset).at("offset")
+        check_offset(self.offset).at("offset")?;
+        check_nonlinearity(&self.nonlinearity).at("nonlinearity")
+    }
+
+    /// The sample that is left of `x` without the nonlinearity.
+    pub fn straightened(&self, x: f64) -> f64 {
+        x - hybank_runtime::nonlinearity(&self.nonlinearity, x)
     }
 
     /// Rms of the noise and of the rounding together, relative to full scale: a step of 2^(1 - bits) is an

@@ -52,6 +52,7 @@ pub(super) struct ChannelTable {
     jitter: Option<WrittenTime>,
     gain: Option<f64>,
     offset: Option<f64>,
+    nonlinearity: Vec<f64>,
 }
 
 #[derive(Default, Deserialize)]
@@ -200,6 +201,7 @@ impl ChannelTable {
             jitter: jitter + Seconds(0.0),
             gain: self.gain.unwrap_or(1.0),
             offset: self.offset.unwrap_or(0.0) + 0.0,
+            nonlinearity: self.nonlinearity,
         };
         Ok((channel, error))
     }

@@ -6,13 +6,14 @@
 //! inputs [`SideBySide`], [`Zeros`], slices of samples and [`PcmOutput`](crate::PcmOutput). The kernels'
 //! blocks are converted one by one, so that no adapter needs memory of its own.
 
+mod corrections;
 mod in_memory;
-mod offsets;
 mod pcm;
 mod side_by_side;
 
+pub use corrections::nonlinearity;
+pub(crate) use corrections::{Corrected, Corrections};
 pub use in_memory::{Interleaved, Planar};
-pub(crate) use offsets::{Offsets, WithoutOffsets};
 pub use pcm::PcmOutput;
 pub use side_by_side::SideBySide;
 

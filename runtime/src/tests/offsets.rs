@@ -165,5 +165,30 @@ fn offsets_that_do_not_fit_are_refused() {
         let refused = plan().with_offsets(&[0.0, value]).unwrap_err();
         assert!(matches!(refused, BuildError::NotFinite { index: 1, .. }), "{refused}");
     }
-    assert!(plan().with_offsets(&[0.0, -0.0]).unwrap().offsets().is_none());
+    assert!(plan().with_offsets(&[0.0, -0.0]).unwrap().corrections().is_none());
+}
+
+/// By the definition of Chebyshev's polynomials, cos(k acos x), in both number types.
+#[test]
+fn nonlinearities_are_subtracted_at_the_sample_as_it_is() {
+    let curves = vec![vec![1e-3, -2e-3, 0.0, 5e-4], vec![], vec![-4e-3]];
+    let offsets = [0.01, 0.0, -0.02];
+    let frames: Vec<f64> = (0..3 * 200).map(|n| 1.1 * (0.37 * f64::from(n)).sin()).collect();
+    let straight = |(n, &x): (usize, &f64)| {
+        let angle = x.clamp(-1.0, 1.0).acos();
+        let curve: f64 = curves[n % 3].iter().zip(2..).map(|(a, k)| a * (f64::from(k) * angle).cos()).sum();
+        x - curve - offsets[n % 3]
+    };
+    let expected: Vec<f64> = frames.iter().enumerate().map(straight).collect();
+    let taps = vec![vec![0.5, 0.25, -0.125]; 3];
+    let options = Options { precision: Precision::Double, ..Options::default() };
+    let plain = Plan::from_taps(&taps, 2, 0, options).unwrap();
+    let corrected = plain.clone().with_corrections(&offsets, &curves).unwrap();
+    let run = |plan: Plan, frames: &[f64]| -> Vec<f64> {
+        let mut output = vec![0.0; 400];
+        Stream::new(&plan).process(frames, &mut output).unwrap();
+        output
+    };
+    let (got, want) = (run(corrected, &frames), run(plain, &expected));
+    assert!(got.iter().zip(&want).all(|(got, want)| (got - want).abs() < 1e-15), "{got:?} {want:?}");
 }

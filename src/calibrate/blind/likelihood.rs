@@ -14,15 +14,9 @@ pub(super) struct BandScore {
     pub(super) equations: NormalEquations,
     /// Noise per sample.
     pub(super) noise: f64,
-}
-
-/// The aliases k of lowest frequency |W + 2 pi k|, `count` of them.
-pub(super) fn lowest_aliases(model: &ChannelModel, w: f64, count: usize) -> Vec<i32> {
-    let reach = count as i32;
-    let mut aliases: Vec<i32> = (-reach..=reach).collect();
-    aliases.sort_by(|a, b| model.alias(w, *a).abs().total_cmp(&model.alias(w, *b).abs()));
-    aliases.truncate(count);
-    aliases
+    /// By how much the columns of A miss those of the data: chi squared, and its degrees of freedom.
+    pub(super) squares: f64,
+    pub(super) freedom: usize,
 }
 
 /// Score and information of one band with the given occupied aliases; `None` where the aliases cannot be
@@ -69,7 +63,22 @@ pub(super) fn band_score(
         scale * (coupling * (&rows[c] * &weight * rows[r].adjoint())[(0, 0)]).re
     });
     let mut all = equations.projection.iter().chain(equations.gram.iter());
-    all.all(|x| x.is_finite()).then_some(BandScore { equations, noise })
+    let squares = mismatch(band, sources, noise * (a.nrows() - sources) as f64);
+    let freedom = 2 * sources * (a.nrows() - sources);
+    all.all(|x| x.is_finite()).then_some(BandScore { equations, noise, squares, freedom })
+}
+
+/// Chi squared of the columns that a model gives against free ones, from the power `left` outside of them.
+///
+/// Free columns leave the N - p least eigenvalues, whose sum is (N - p) (1 - p / L) times the noise on
+/// average. The difference is that of 2 p (N - p) real angles between two subspaces, each with the variance
+/// of noise over 2 L.
+fn mismatch(band: &SpectralBand, sources: usize, left: f64) -> f64 {
+    let values = band.eigenvalues();
+    let (count, least): (f64, f64) = (band.count as f64, values.iter().skip(sources).sum());
+    let free = (values.len() - sources) as f64 * (1.0 - sources as f64 / count);
+    let noise = (least / free).max(LEAST_NOISE * band.matrix.trace().re);
+    2.0 * count * (left - least) / noise
 }
 
 /// The row of dA that is not zero.

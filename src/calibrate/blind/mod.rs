@@ -10,8 +10,8 @@
 //! over the occupied aliases. Where they are fewer than the channels, A leaves directions that hold noise
 //! only, whatever the signal is, and these determine the ratios of A's rows. Signal S and noise s of each
 //! band of frequencies are free, so the weight of a band follows from its noise. The eigenvalues of its
-//! matrix show which aliases it holds: p large ones are the p aliases of lowest frequency, as a signal after
-//! low-passes has them.
+//! matrix show how many aliases it holds: p large ones are the p aliases in the band of the signal, or next to
+//! it, of these those of lowest frequency.
 //!
 //! Fisher scoring finds the maximum; the inverse of the Fisher information is the covariance of the
 //! estimates.
@@ -28,18 +28,19 @@ mod tests;
 
 use super::CalibrationSettings;
 use super::error::CalibrateError;
-use super::estimates::{Fitted, WORST_CONDITION};
+use super::estimates::{Fitted, WORST_CONDITION, pooled};
 use super::fit::{ChannelParameter, FittedValues};
 use super::model::{ChannelModel, ChannelValues};
-use super::record::{Record, longest_run};
+use super::record::{Acquisition, longest_run};
 use super::warning::CalibrationWarning;
+use crate::linalg::Complex;
 use crate::linalg::least_squares::{LeastSquares, Minimum, NoMinimum, NormalEquations, StepLimits, minimise};
-use crate::linalg::solve;
 use crate::sine_fit::Estimate;
-use likelihood::{band_score, lowest_aliases};
+use crate::spec::HALF_WIDTH;
+use likelihood::band_score;
 use single::bands_within;
 pub(super) use single::{SingleBand, unexplained_in_order};
-use spectra::occupied;
+use spectra::{LOWEST_BINS, occupied};
 pub(super) use spectra::{Spectra, SpectralBand};
 use std::ops::RangeInclusive;
 
@@ -53,11 +54,18 @@ const LARGEST_STEP: f64 = 0.5;
 /// within a band, and once the delays are known.
 const FIRST_LEAST: f64 = 1e-3;
 const FINAL_LEAST: f64 = 1e-6;
+/// The columns of the data differ from the model clearly if they do so this many times as much as the noise
+/// explains.
+const DOUBTFUL_MISFIT: f64 = 1.2;
+/// Offsets whose intervals are so many times as wide as those of noise alone are hidden by the signal.
+const HIDDEN_RATIO: f64 = 3.0;
 /// A logarithm of a gain or of a cut-off beyond this is lost.
 const FARTHEST_LOGARITHM: f64 = 3.0;
 
 /// Bands whose aliases were found.
 struct Occupied {
+    /// Among the bands of all acquisitions.
+    index: usize,
     band: SpectralBand,
     aliases: Vec<i32>,
 }
@@ -70,7 +78,8 @@ const CLEARLY_MORE: f64 = 100.0;
 /// The data of a blind fit.
 pub(super) struct Blind<'a> {
     model: &'a ChannelModel,
-    spectra: Spectra,
+    /// Of each acquisition.
+    spectra: Vec<Spectra>,
     frames: usize,
     /// Bands with more aliases are left out.
     most_aliases: usize,
@@ -80,11 +89,12 @@ pub(super) struct Blind<'a> {
 pub(super) struct Maximum<'a> {
     blind: &'a Blind<'a>,
     point: ChannelValues,
-    /// The bands that are used, by their frequency, and the number of their aliases. They stay the same ones
-    /// while the point moves; only their phases follow it.
-    used: Vec<(f64, usize)>,
-    /// Of the lower and of the upper half of the used bands.
-    halves: [NormalEquations; 2],
+    /// The number of aliases of each band of all acquisitions, 0 for those that are not used. They stay the
+    /// same ones while the point moves; only their phases follow it.
+    used: Vec<usize>,
+    /// How far the bands are from the model: chi squared, and its degrees of freedom.
+    squares: f64,
+    freedom: usize,
     /// Mean noise of the used bands, per sample.
     noise: f64,
 }
@@ -95,22 +105,22 @@ impl LeastSquares for Maximum<'_> {
     const WORST_CONDITION: f64 = WORST_CONDITION;
 
     fn equations(&mut self) -> Result<NormalEquations, CalibrateError> {
-        let none = NormalEquations::new(self.point.parameters.len());
-        (self.halves, self.noise) = ([none.clone(), none.clone()], 0.0);
+        let mut all = NormalEquations::new(self.point.parameters.len());
+        (self.squares, self.freedom, self.noise) = (0.0, 0, 0.0);
         let model = self.blind.model;
-        let bands = self.blind.spectra.bands(&self.point.delays).into_iter();
-        let used = bands.filter_map(|band| Some((self.used.iter().find(|used| used.0 == band.w)?.1, band)));
-        let (count, mut scored) = (self.used.len(), 0);
-        for (number, (aliases, band)) in used.enumerate() {
-            let aliases = lowest_aliases(model, band.w, aliases);
+        let bands = self.blind.all_bands(&self.point.delays);
+        let mut scored = 0;
+        for (&aliases, band) in self.used.iter().zip(bands).filter(|(aliases, _)| **aliases > 0) {
+            let aliases = model.occupied_aliases(band.w, aliases);
             let Some(score) = band_score(model, &self.point, &band, &aliases) else { continue };
-            add(&mut self.halves[usize::from(2 * number >= count)], &score.equations);
+            all.gram += &score.equations.gram;
+            all.projection += &score.equations.projection;
             self.noise += score.noise;
+            self.squares += score.squares;
+            self.freedom += score.freedom;
             scored += 1;
         }
         self.noise /= scored.max(1) as f64;
-        let mut all = none;
-        self.halves.iter().for_each(|half| add(&mut all, half));
         Ok(all)
     }
 
@@ -137,25 +147,32 @@ impl LeastSquares for Maximum<'_> {
     }
 }
 
-fn add(sum: &mut NormalEquations, other: &NormalEquations) {
-    sum.gram += &other.gram;
-    sum.projection += &other.projection;
-}
-
 impl<'a> Blind<'a> {
-    /// Of the longest run of frames that no record lacks; bands with more than so many aliases are left out.
+    /// Of the longest run of frames of each acquisition that no record lacks; bands with more than so many
+    /// aliases are left out.
     pub(super) fn new(
         model: &'a ChannelModel,
-        records: &[Record],
+        acquisitions: &[Acquisition<'_>],
         most_aliases: usize,
     ) -> Result<Self, CalibrateError> {
-        let (first, frames) = longest_run(records);
-        if frames < LEAST_FRAMES {
-            return Err(CalibrateError::TooShort { frames, needed: LEAST_FRAMES });
-        }
-        let captures: Vec<&[f64]> = records.iter().map(|r| &r.samples[first..first + frames]).collect();
-        let spectra = Spectra::new(&captures, &model.delays, model.ratio);
-        Ok(Self { model, spectra, frames, most_aliases })
+        let count = acquisitions.len();
+        let run = |Acquisition { name, records }: &Acquisition<'_>| {
+            let (first, frames) = longest_run(records);
+            if frames < LEAST_FRAMES {
+                let short = CalibrateError::TooShort { frames, needed: LEAST_FRAMES };
+                return Err(short.within(name, count));
+            }
+            let captures: Vec<&[f64]> = records.iter().map(|r| &r.samples[first..first + frames]).collect();
+            Ok((frames, Spectra::new(&captures, &model.delays, model.ratio)))
+        };
+        let all: Vec<(usize, Spectra)> = acquisitions.iter().map(run).collect::<Result<_, _>>()?;
+        let frames = all.iter().map(|(frames, _)| frames).sum();
+        Ok(Self {
+            model,
+            spectra: all.into_iter().map(|(_, spectra)| spectra).collect(),
+            frames,
+            most_aliases,
+        })
     }
 
     /// The estimates at the maximum of the likelihood near the nominal values, with the warnings that their
@@ -164,34 +181,44 @@ impl<'a> Blind<'a> {
         let CalibrationSettings { fit, reference } = settings;
         let first = self.ascended(ChannelValues::nominal(self.model, fit, reference), FIRST_LEAST)?.0;
         let (maximum, minimum) = self.ascended(first.point, FINAL_LEAST)?;
-        let factor = self.spectra.variance_factor;
-        let disagreement = maximum.disagreement(factor);
+        let factor = self.spectra.iter().map(|spectra| spectra.variance_factor).fold(1.0, f64::max);
+        let (squares, freedom) = (maximum.squares / factor, maximum.freedom);
         let offsets = fit.offset.then(|| maximum.offsets(reference));
+        let folded = offsets.as_ref().and_then(|offsets| maximum.folded(offsets));
         let mut fitted = Fitted::new(maximum.point, minimum.inverse * factor, self.frames);
-        let misfit = disagreement.and_then(|(squares, freedom)| fitted.widen(squares, freedom));
+        let misfit = fitted.widen(squares, freedom.saturating_sub(fitted.point.parameters.len()));
+        let misfit = misfit.filter(|&misfit| misfit > DOUBTFUL_MISFIT);
         fitted.warnings.extend(misfit.map(|misfit| CalibrationWarning::BandsDisagree { misfit }));
+        fitted.warnings.extend(folded);
         fitted.offsets = offsets;
         Ok(fitted)
     }
 
+    fn all_bands(&self, delays: &[f64]) -> impl Iterator<Item = SpectralBand> {
+        self.spectra.iter().flat_map(move |spectra| spectra.bands(delays))
+    }
+
     fn bands(&self, delays: &[f64], least: f64) -> Vec<Occupied> {
-        let bands = self.spectra.bands(delays);
-        let counts = occupied(&bands, least);
-        let of = |(band, count): (SpectralBand, usize)| {
-            let aliases = lowest_aliases(self.model, band.w, count);
-            (1..=self.most_aliases).contains(&count).then_some(Occupied { band, aliases })
+        let counted = self.spectra.iter().flat_map(|spectra| {
+            let bands = spectra.bands(delays);
+            let counts = occupied(&bands, least);
+            bands.into_iter().zip(counts)
+        });
+        let of = |(index, (band, count)): (usize, (SpectralBand, usize))| {
+            let aliases = self.model.occupied_aliases(band.w, count);
+            (1..=self.most_aliases).contains(&count).then_some(Occupied { index, band, aliases })
         };
-        bands.into_iter().zip(counts).filter_map(of).collect()
+        counted.enumerate().filter_map(of).collect()
     }
 
     fn ascended(&self, point: ChannelValues, least: f64) -> Result<(Maximum<'_>, Minimum), CalibrateError> {
-        let used = self.bands(&point.delays, least);
-        let used: Vec<(f64, usize)> = used.iter().map(|used| (used.band.w, used.aliases.len())).collect();
-        if used.is_empty() {
+        let occupied = self.bands(&point.delays, least);
+        let mut used = vec![0; self.all_bands(&point.delays).count()];
+        occupied.iter().for_each(|one| used[one.index] = one.aliases.len());
+        if occupied.is_empty() {
             return Err(CalibrateError::AllAliasesOccupied { channels: self.model.channels() });
         }
-        let none = NormalEquations::new(0);
-        let mut maximum = Maximum { blind: self, point, used, halves: [none.clone(), none], noise: 0.0 };
+        let mut maximum = Maximum { blind: self, point, used, squares: 0.0, freedom: 0, noise: 0.0 };
         let minimum = minimise(&mut maximum)?;
         Ok((maximum, minimum))
     }
@@ -216,9 +243,10 @@ impl<'a> Blind<'a> {
             band.unexplained(&self.model.steering(point, band.w, &[alias]))
         };
         let used = self.bands(&found.delays, FIRST_LEAST);
-        let at_nominal = self.spectra.bands(&nominal.delays).into_iter();
-        let same = at_nominal.filter(|band| used.iter().any(|used| used.band.w == band.w));
-        let before = same.map(|band| self.least_over_aliases(|alias| left(&nominal, &band, alias))).sum();
+        let at_nominal = self.all_bands(&nominal.delays).enumerate();
+        let same = at_nominal.filter(|(index, _)| used.iter().any(|used| used.index == *index));
+        let before =
+            same.map(|(_, band)| self.least_over_aliases(|alias| left(&nominal, &band, alias))).sum();
         (before, used.iter().map(|used| left(found, &used.band, used.aliases[0])).sum())
     }
 
@@ -262,29 +290,48 @@ impl<'a> Blind<'a> {
 }
 
 impl Maximum<'_> {
-    /// By how much the estimates of the two halves of the bands differ: d' (C1 + C2)^-1 d and its degrees of
-    /// freedom. `None` where a half alone does not determine the parameters.
-    fn disagreement(&self, factor: f64) -> Option<(f64, usize)> {
-        let [lower, upper] = &self.halves;
-        let [c1, c2] = [lower.inverse(WORST_CONDITION).ok()?, upper.inverse(WORST_CONDITION).ok()?];
-        let difference = &c1 * &lower.projection - &c2 * &upper.projection;
-        let squares = difference.dot(&solve(&((c1 + c2) * factor), &difference));
-        squares.is_finite().then_some((squares, difference.len()))
-    }
-
-    /// o_i. The signal's own mean is not known, so the reference keeps its offset.
+    /// o_i. The signal's own mean is not known, so the reference keeps its offset, and an offset follows from
+    /// the difference y = x_i - x_r c_i / c_r, of which the signal near 0 Hz is gone. What noise and aliases of
+    /// 0 Hz, at multiples of the slow rate, leave of it is a stationary sequence, so the density of its lowest
+    /// frequencies is that at 0 Hz and gives the variance of its mean.
     fn offsets(&self, reference: usize) -> Vec<Estimate<f64>> {
         let Blind { model, spectra, .. } = self.blind;
-        let constant = |i: usize| self.point.gain(i, model) * model.response(i, 0.0, 0.0).re;
-        let signal = spectra.means[reference] - model.offsets[reference];
-        let sigma = (2.0 * self.noise * spectra.mean_variance).sqrt();
+        let of_spectra = |i: usize| spectra.iter().map(move |spectra| self.offset(spectra, i, reference));
         let offset = |i: usize| match i == reference {
             true => Estimate { value: model.offsets[reference], sigma: 0.0 },
-            false => {
-                let value = spectra.means[i] - signal * constant(i) / constant(reference);
-                Estimate { value, sigma }
-            }
+            false => pooled(of_spectra(i)),
         };
         (0..model.channels()).map(offset).collect()
+    }
+
+    /// That of channel i by one acquisition.
+    fn offset(&self, spectra: &Spectra, i: usize, reference: usize) -> Estimate<f64> {
+        let signal = spectra.means[reference] - self.blind.model.offsets[reference];
+        let value = spectra.means[i] - signal * self.steady_ratio(i, reference, 0.0).re;
+        let lowest = |i: usize| spectra.lowest(i, self.point.delays[i]);
+        let difference = |((w, own), (_, other)): ((f64, Complex<f64>), (f64, Complex<f64>))| {
+            (own - other * self.steady_ratio(i, reference, w)).norm_sqr()
+        };
+        let power: f64 = lowest(i).zip(lowest(reference)).map(difference).sum();
+        let density = power / (LOWEST_BINS - 1) as f64;
+        Estimate { value, sigma: (density * spectra.mean_variance).sqrt() }
+    }
+
+    /// How channel i passes the alias of W next to 0 Hz, over how the reference does.
+    fn steady_ratio(&self, i: usize, reference: usize, w: f64) -> Complex<f64> {
+        let model = self.blind.model;
+        let passed = |i: usize| model.response(i, model.alias(w, 0), self.point.ln_cutoffs[i]);
+        let gains = self.point.gain(i, model) / self.point.gain(reference, model);
+        passed(i) / passed(reference) * gains
+    }
+
+    /// Says that the signal hides the offsets, if they are known far worse than the noise would leave them.
+    fn folded(&self, offsets: &[Estimate<f64>]) -> Option<CalibrationWarning> {
+        let weights = self.blind.spectra.iter().map(|spectra| spectra.mean_variance.recip());
+        let of_noise = (2.0 * self.noise / weights.sum::<f64>()).sqrt();
+        let worst = offsets.iter().map(|offset| offset.sigma).fold(0.0, f64::max);
+        let half_width = HALF_WIDTH * worst;
+        (worst > HIDDEN_RATIO * of_noise)
+            .then_some(CalibrationWarning::OffsetsHidden { half_width, noise: HALF_WIDTH * of_noise })
     }
 }

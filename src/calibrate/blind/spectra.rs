@@ -8,6 +8,8 @@ use std::f64::consts::{PI, TAU};
 const TAPER_SHARE: f64 = 0.05;
 /// The lowest bins hold the constant and what is left of it.
 const FIRST_BIN: usize = 3;
+/// Bins that tell the density at 0 Hz: a tenth of the shortest record, so that it is known to a fifth.
+pub(super) const LOWEST_BINS: usize = 24;
 /// Bins per band, if the record is long enough, and the most bands.
 const BINS_PER_BAND: usize = 32;
 const MOST_BANDS: usize = 128;
@@ -79,6 +81,14 @@ impl Spectra {
         (0..count).map(|b| self.band(edge(b), edge(b + 1), delays)).collect()
     }
 
+    /// The bins next to 0 Hz of a channel with the phase of its `delay` removed, each with its W.
+    pub(super) fn lowest(&self, channel: usize, delay: f64) -> impl Iterator<Item = (f64, Complex<f64>)> {
+        let step = TAU / self.frames as f64;
+        let lowest = (FIRST_BIN..FIRST_BIN + LOWEST_BINS).map(move |b| (b as f64 * step, b));
+        let unturned = move |w: f64| Complex::from_polar(1.0, w * delay / self.ratio);
+        lowest.map(move |(w, b)| (w, self.bins[channel][b] * unturned(w)))
+    }
+
     fn band(&self, first: usize, end: usize, delays: &[f64]) -> SpectralBand {
         let n = self.bins.len();
         let mut matrix = CMat::zeros(n, n);
@@ -114,7 +124,7 @@ impl SpectralBand {
     }
 
     /// Eigenvalues, largest first; none if they cannot be computed.
-    fn eigenvalues(&self) -> Vec<f64> {
+    pub(super) fn eigenvalues(&self) -> Vec<f64> {
         let mut values = hermitian_eigenvalues(&self.matrix).unwrap_or_default();
         values.sort_by(|a, b| b.total_cmp(a));
         values

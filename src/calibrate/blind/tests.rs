@@ -1,8 +1,9 @@
 //! Blind fits of band-limited noise: coverage, efficiency, and what is refused.
 
-use crate::calibrate::testbench::{assert_covers, gaussian, trials};
+use crate::calibrate::testbench::{assert_covers, assert_holds, gaussian, trials};
 use crate::calibrate::{
-    CalibrateError, Calibration, CalibrationSettings, CalibrationSignal, FittedValues, Record, calibrate,
+    Acquisition, CalibrateError, Calibration, CalibrationSettings, CalibrationSignal, FittedValues, Record,
+    calibrate, calibrate_pooled,
 };
 use crate::random::Random;
 use crate::simulate::{Instants, Periodic};
@@ -11,7 +12,7 @@ use crate::units::FastPeriods;
 use std::f64::consts::PI;
 
 const BLIND: CalibrationSettings = CalibrationSettings {
-    fit: FittedValues { delay: true, gain: true, offset: true, cutoff: None },
+    fit: FittedValues { delay: true, gain: true, offset: true, cutoff: None, nonlinearity: None },
     reference: 0,
 };
 
@@ -24,18 +25,27 @@ fn spec(ratio: usize, delays: &[f64]) -> Spec {
     Spec::from_toml(&(head + &channels), "spec.toml").unwrap()
 }
 
-/// Gaussian noise of `samples` fast samples below `band` rad per fast period: a sum over neighbours with a
-/// windowed sinc.
+/// The same with a `[signal]` in a band of cycles per fast period.
+fn in_band(ratio: usize, delays: &[f64], band: [f64; 2]) -> Spec {
+    let text = spec(ratio, delays).to_toml().unwrap() + &format!("\n[signal]\nband = {band:?}\n");
+    Spec::from_toml(&text, "spec.toml").unwrap()
+}
+
+/// Gaussian noise of `samples` fast samples in a band (rad per fast period): a sum over neighbours with a
+/// windowed sinc less another. It is periodic.
+fn noise_in_band(samples: usize, [low, high]: [f64; 2], dice: &mut Random) -> Vec<f64> {
+    let reach = 128i64;
+    let sinc = |band: f64, n: i64| if n == 0 { band / PI } else { (band * n as f64).sin() / (PI * n as f64) };
+    let window = |n: i64| 0.5 + 0.5 * (PI * n as f64 / (reach as f64 + 1.0)).cos();
+    let taps: Vec<f64> = (-reach..=reach).map(|n| (sinc(high, n) - sinc(low, n)) * window(n)).collect();
+    let white: Vec<f64> = (0..samples).map(|_| gaussian(dice)).collect();
+    let around = |n: usize| white[n..].iter().chain(&white).zip(&taps);
+    (0..samples).map(|n| around(n).map(|(white, tap)| white * tap).sum()).collect()
+}
+
+/// The same below `band`.
 fn band_limited(samples: usize, band: f64, dice: &mut Random) -> Vec<f64> {
-    let reach = 64i64;
-    let tap = |n: i64| {
-        let x = n as f64;
-        let sinc = if n == 0 { band / PI } else { (band * x).sin() / (PI * x) };
-        sinc * (0.5 + 0.5 * (PI * x / (reach as f64 + 1.0)).cos())
-    };
-    let taps: Vec<f64> = (-reach..=reach).map(tap).collect();
-    let white: Vec<f64> = (0..samples + taps.len()).map(|_| gaussian(dice)).collect();
-    (0..samples).map(|n| taps.iter().zip(&white[n..]).map(|(a, b)| a * b).sum()).collect()
+    noise_in_band(samples, [0.0, band], dice)
 }
 
 /// The captures of `truth`, with noise relative to the signal.
@@ -155,4 +165,82 @@ fn speech_gives_its_delay_to_1e_5_fast_periods() {
         assert!((delay.value.0 - 0.6).abs() < 1e-5, "{delay:?}");
         assert!(delay.sigma.0 < 1e-5 && (delay.value.0 - 0.6).abs() < 4.0 * delay.sigma.0, "{delay:?}");
     }
+}
+
+/// A signal that is elsewhere than the spec says, so that other aliases are taken for its own.
+#[test]
+fn a_band_that_the_signal_does_not_keep_is_a_misfit() {
+    let (spec, mut dice) = (in_band(4, &[3.0, 2.0, 1.0, 0.0], [0.265, 0.36]), Random(22));
+    let signal = noise_in_band(2 * 2048 * 4, [0.1 * PI, 0.4 * PI], &mut dice);
+    let records = captures(&spec, &signal, 2048, 1e-3, &mut dice);
+    match calibrate(&spec, &records, &CalibrationSignal::Any, BLIND) {
+        Ok(found) => assert!(found.misfit.is_some_and(|misfit| misfit > 2.0), "{:?}", found.misfit),
+        Err(refused) => assert!(!matches!(refused, CalibrateError::AllAliasesOccupied { .. }), "{refused}"),
+    }
+}
+
+/// The offsets of noise whose band covers none, one and three multiples of the slow rate.
+#[test]
+fn intervals_of_offsets_cover_where_the_signal_folds_onto_0_hertz() {
+    let draws = if trials::is_slow("offsets of 100 draws") { 100 } else { 12 };
+    for (ratio, band) in [(4, [0.02, 0.42]), (4, [0.02, 0.74]), (8, [0.02, 0.85])] {
+        let delays: Vec<f64> = (0..ratio).rev().map(|i| i as f64).collect();
+        let (spec, mut dice, mut scaled) = (spec(ratio, &delays), Random(17), Vec::new());
+        for _ in 0..draws {
+            let mut truth = with_errors(&spec, &mut dice);
+            truth.channels.iter_mut().skip(1).for_each(|channel| channel.offset = 0.01 * dice.sample());
+            let frames = 2048;
+            let signal = noise_in_band(2 * frames * ratio, band.map(|edge| edge * PI), &mut dice);
+            let records = captures(&truth, &signal, frames, 1e-3, &mut dice);
+            let found = calibrate(&spec, &records, &CalibrationSignal::Any, BLIND).unwrap();
+            let pairs = found.channels.iter().zip(&truth.channels).skip(1);
+            scaled.extend(pairs.map(|(found, truth)| {
+                let offset = found.offset.unwrap();
+                (offset.value - truth.offset) / offset.sigma
+            }));
+        }
+        assert_holds(&scaled, draws, &format!("offsets, band {band:?}"));
+    }
+}
+
+/// Noise in a band far above 0 Hz, each frequency of which folds.
+#[test]
+fn intervals_cover_in_a_band_of_an_intermediate_frequency() {
+    let draws = if trials::is_slow("an intermediate frequency of 100 draws") { 100 } else { 12 };
+    let spec = in_band(4, &[3.0, 2.0, 1.0, 0.0], [0.265, 0.36]);
+    let (mut dice, mut all) = (Random(18), Vec::new());
+    for _ in 0..draws {
+        let truth = with_errors(&spec, &mut dice);
+        let signal = noise_in_band(2 * 2048 * 4, [0.53 * PI, 0.72 * PI], &mut dice);
+        let records = captures(&truth, &signal, 2048, 1e-3, &mut dice);
+        let found = calibrate(&spec, &records, &CalibrationSignal::Any, BLIND).unwrap();
+        assert!(found.misfit.is_some_and(|misfit| misfit < 1.2), "{:?}", found.misfit);
+        all.extend(scaled(&truth, &spec, &found));
+    }
+    assert_holds(&all, draws, "an intermediate frequency");
+}
+
+/// Two acquisitions tell more than each, and their intervals say so.
+#[test]
+fn acquisitions_of_any_signal_are_pooled() {
+    let draws = if trials::is_slow("pooled acquisitions of 100 draws") { 100 } else { 12 };
+    let (spec, mut dice, mut all) = (spec(4, &[3.0, 2.0, 1.0, 0.0]), Random(23), Vec::new());
+    for _ in 0..draws {
+        let mut truth = with_errors(&spec, &mut dice);
+        truth.channels[2].offset = 0.01;
+        let records = [0.3, 0.6].map(|high| {
+            let signal = noise_in_band(2 * 1024 * 4, [0.0, high * PI], &mut dice);
+            captures(&truth, &signal, 1024, 1e-3, &mut dice)
+        });
+        let both = [0, 1].map(|k| Acquisition { name: ["a", "b"][k], records: &records[k] });
+        let fit =
+            |all: &[Acquisition<'_>]| calibrate_pooled(&spec, all, &CalibrationSignal::Any, BLIND).unwrap();
+        let found = fit(&both);
+        let sigma = |found: &Calibration| found.channels[1].delay.unwrap().sigma.0;
+        assert!(both.iter().all(|one| sigma(&fit(&[*one])) > sigma(&found)));
+        all.extend(scaled(&truth, &spec, &found));
+        let offset = found.channels[2].offset.unwrap();
+        all.push((offset.value - 0.01) / offset.sigma);
+    }
+    assert_holds(&all, draws, "pooled acquisitions");
 }

@@ -142,6 +142,16 @@ pub(super) fn trials(few: u64) -> usize {
     trials::trials(few).count()
 }
 
+/// Checks a campaign of few draws: 95 % intervals hold the truth in 93 to 97 % of the cases, or differ from
+/// that by less than three standard deviations of their number.
+pub(super) fn assert_holds(scaled: &[f64], draws: usize, what: &str) {
+    let count = scaled.len() as f64;
+    let inside = scaled.iter().filter(|x| x.abs() < 1.96).count() as f64 / count;
+    println!("{what}: {:.1} % of {count} intervals, {draws} draws", 100.0 * inside);
+    let chance = 3.0 * (0.95 * 0.05 / count).sqrt();
+    assert!((inside - 0.95).abs() < chance.max(0.02), "{what}: {:.1} % of {count}", 100.0 * inside);
+}
+
 /// Checks that 95 % intervals hold the truth in 93 to 97 % of the cases; wider for fewer trials.
 pub(super) fn assert_covers(scaled: &[f64], trials: usize) {
     let inside = scaled.iter().filter(|x| x.abs() < 1.96).count() as f64 / scaled.len() as f64;

@@ -78,14 +78,14 @@ pub(super) fn zone_of(
     phases: &[f64],
     reference: usize,
 ) -> Result<f64, CalibrateError> {
-    let all = alias.candidates(model.ratio, model.fast_zone).into_iter();
+    let all = alias.candidates(model.ratio, model.fast_zone()).into_iter();
     let mut all: Vec<(f64, f64)> =
         all.map(|candidate| (candidate.distance(model, phases, reference), candidate.cycles)).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     match all[..] {
         [best, second, ..] if best.0 > CLEAR_SHARE * second.0 || best.0 > CLEAR_PHASE => {
             let [alias, best, other] = [alias.cycles, best.1, second.1].map(|x| model.slow_rate() * x);
-            let ends = [model.fast_zone, model.fast_zone + 1];
+            let ends = [model.fast_zone(), model.fast_zone() + 1];
             let zone = ends.map(|end| model.slow_rate() * (0.5 * (model.ratio * end) as f64));
             Err(CalibrateError::AmbiguousZone { alias, best, other, zone })
         }

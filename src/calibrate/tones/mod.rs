@@ -8,30 +8,31 @@
 //! ```
 //!
 //! where s_it is the derivative of ln Phi_i(j w_t / c) by ln c. Real and imaginary part are two equations
-//! per tone; least squares over the tones gives the values of the channel, and the errors of the amplitudes
-//! their covariance.
+//! per tone; least squares over the tones gives the values of all channels, and the errors of the amplitudes
+//! their covariance. Jitter errs along the slope of the tones and not as white noise does, which the
+//! covariance takes into account.
 
 mod ambiguity;
-mod channel;
 mod interference;
 mod phasors;
+mod ratios;
 mod solution;
 #[cfg(test)]
 mod tests;
 
 use super::CalibrationSettings;
 use super::error::CalibrateError;
-use super::estimates::{CalibrationTone, Fitted, contradiction};
+use super::estimates::{CalibrationTone, Fitted, pooled};
 use super::model::ChannelModel;
 use super::order::{Distances, other_order};
 use super::record::Acquisition;
 use super::warning::CalibrationWarning;
 use crate::linalg::Complex;
-use crate::sine_fit::{self, ChannelFit as SineChannel, Estimate, Sense, alias};
+use crate::sine_fit::{self, ChannelFit as SineChannel, CurveFit, Estimate, Sense, SineFit, alias};
 use crate::spec::Spec;
 use crate::units::{Decibels, Hertz};
 use ambiguity::{ObservedTone, zone_of};
-use interference::{is_harmonic, repeating_variances, widen_repeating};
+use interference::{is_harmonic, jitter, repeating_variances, widen_repeating};
 use phasors::{TonePhasors, ToneRecords};
 use solution::{CUTOFF_TONES, distinct, explained, outlying, solve};
 
@@ -44,6 +45,8 @@ const SEARCH_CYCLES: f64 = 3.0;
 /// Least distance from a multiple of half the slow rate in cycles per record. At half of it the errors of
 /// amplitude and phase are already twice those in the middle of a zone.
 const LEAST_CYCLES: f64 = 1.0;
+/// Parts of a single acquisition, each of which a nonlinearity of the others is judged by.
+const PARTS: usize = 8;
 
 /// Calibrates from tones near `given`, or from those that are found. Of several acquisitions each holds at
 /// least one of the tones.
@@ -57,10 +60,15 @@ pub(super) fn fit(
     let layout = spec.layout();
     // Of converters of one rate it is the same model.
     let of_frames = if layout.is_plain() { model.clone() } else { ChannelModel::new(&spec.per_sample())? };
-    let measure = |one: &Acquisition<'_>| {
+    let measure = |one: &Acquisition<'_>| -> Result<Tones, CalibrateError> {
         let captures = ToneRecords::new(one.records, &layout);
         let held = held(model, &captures, given, acquisitions.len() > 1)?;
-        Tones::measure(model, &of_frames, &captures, &held, settings.reference)
+        let mut tones = Tones::measure(model, &of_frames, &captures, &held, settings.reference)?;
+        if let Some(order) = settings.fit.nonlinearity {
+            let parts = if acquisitions.len() == 1 { PARTS } else { 1 };
+            tones.curves = captures.curves(&tones.sines, order, parts);
+        }
+        Ok(tones)
     };
     let count = acquisitions.len();
     let measure = |one: &Acquisition<'_>| measure(one).map_err(|error| error.within(one.name, count));
@@ -91,6 +99,7 @@ pub(super) fn fit(
         add_offsets(&mut fitted, &all);
     }
     fitted.warnings.extend(warnings);
+    fitted.curves = (0..model.channels()).filter_map(|i| curve(&all, i)).collect();
     fitted.tones = all.into_iter().flat_map(|tones| tones.tones).collect();
     Ok(fitted)
 }
@@ -102,10 +111,15 @@ struct Tones {
     given: Vec<Hertz>,
     tones: Vec<CalibrationTone>,
     measured: Vec<TonePhasors>,
+    /// The variance of the mean instant of each converter that is due to jitter, fast periods squared.
+    jitter: Vec<f64>,
+    /// What the tones leave of the samples of each converter, in parts; none unless it was asked for.
+    curves: Vec<CurveFit>,
     /// The constant of each part of each converter.
     constants: Vec<Estimate<f64>>,
     is_complex: bool,
     warnings: Vec<CalibrationWarning>,
+    sines: SineFit,
 }
 
 impl Tones {
@@ -153,10 +167,13 @@ impl Tones {
             given: given.to_vec(),
             tones: used.iter().map(tone).collect(),
             measured,
+            jitter: jitter(&sines, captures, model.ratio),
+            curves: Vec::new(),
             constants: captures
                 .constants(&sines.channels.iter().zip(repeating).map(constant).collect::<Vec<_>>()),
             is_complex: captures.is_complex,
             warnings,
+            sines,
         })
     }
 }
@@ -192,9 +209,37 @@ impl ToneRecords<'_> {
         let parts = self.parts(0).len();
         let converters = (0..self.converters()).map(|converter| self.parts_of(converter));
         let part = |records: std::ops::Range<usize>, part| {
-            mean(records.skip(part).step_by(parts).map(|k| of_records[k]))
+            pooled(records.skip(part).step_by(parts).map(|k| of_records[k]))
         };
         converters.flat_map(|records| (0..parts).map(move |k| part(records.clone(), k))).collect()
+    }
+}
+
+/// The nonlinearity of a converter from all acquisitions, if it was asked for.
+fn curve(all: &[Tones], converter: usize) -> Option<Vec<f64>> {
+    let fits = all.iter().map(|tones| tones.curves.get(converter));
+    Some(fits.collect::<Option<CurveFit>>()?.curve())
+}
+
+impl ToneRecords<'_> {
+    /// The equations of the nonlinearity of each converter, its records cut into so many parts.
+    fn curves(&self, sines: &SineFit, order: usize, parts: usize) -> Vec<CurveFit> {
+        let of_converter = |converter: usize| {
+            let mut fit = CurveFit::new(order);
+            for (part, i) in self.records_of(converter).flat_map(|i| self.parts(i).map(move |part| (part, i)))
+            {
+                let record = &self.records[i];
+                let samples = record.parts().nth(part - self.parts(i).start).unwrap_or_default();
+                let left = sines.residual(part, samples);
+                let all: Vec<(f64, f64, bool)> =
+                    samples.iter().zip(left).zip(&record.keep).map(|((x, r), keep)| (*x, r, *keep)).collect();
+                for piece in all.chunks(all.len().div_ceil(parts).max(1)) {
+                    fit.add(piece.iter().filter(|(_, _, keep)| *keep).map(|(x, r, _)| (*x, *r)));
+                }
+            }
+            fit
+        };
+        (0..self.converters()).map(of_converter).collect()
     }
 }
 
@@ -202,7 +247,7 @@ impl ToneRecords<'_> {
 fn add_offsets(fitted: &mut Fitted, all: &[Tones]) {
     let parts = all.first().map_or(0, |tones| tones.constants.len());
     let constants: Vec<Estimate<f64>> =
-        (0..parts).map(|k| mean(all.iter().map(|tones| tones.constants[k]))).collect();
+        (0..parts).map(|k| pooled(all.iter().map(|tones| tones.constants[k]))).collect();
     if all.iter().all(|tones| tones.is_complex) {
         let values: Vec<f64> = constants.iter().map(|constant| constant.value).collect();
         let offsets = values.chunks(2).map(<[f64]>::to_vec).collect();
@@ -210,21 +255,6 @@ fn add_offsets(fitted: &mut Fitted, all: &[Tones]) {
     } else {
         fitted.offsets = Some(constants);
     }
-}
-
-/// The weighted mean of estimates of one value. Where they contradict each other by more than chance, its
-/// standard deviation is as much larger.
-fn mean(all: impl Iterator<Item = Estimate<f64>> + Clone) -> Estimate<f64> {
-    let count = all.clone().count();
-    if let (1, Some(one)) = (count, all.clone().next()) {
-        return one;
-    }
-    let weight = |one: &Estimate<f64>| one.sigma.powi(2).max(f64::MIN_POSITIVE).recip();
-    let weights: f64 = all.clone().map(|one| weight(&one)).sum();
-    let value = all.clone().map(|one| weight(&one) * one.value).sum::<f64>() / weights;
-    let squares: f64 = all.map(|one| weight(&one) * (one.value - value).powi(2)).sum();
-    let widening = contradiction(squares, count - 1).unwrap_or(1.0);
-    Estimate { value, sigma: widening / weights.sqrt() }
 }
 
 /// Starts of a fit near given frequencies.

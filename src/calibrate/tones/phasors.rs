@@ -31,6 +31,8 @@ pub(super) struct TonePhasors {
     pub(super) ratios: Vec<Complex<f64>>,
     /// Standard deviations of ln |ratio| (real part) and of its phase (imaginary part).
     pub(super) sigmas: Vec<Complex<f64>>,
+    /// The variance of ln of the reference's phasor, which is in all of them.
+    pub(super) reference_variance: f64,
 }
 
 impl<'a> ToneRecords<'a> {
@@ -109,6 +111,12 @@ impl<'a> ToneRecords<'a> {
         };
         let expected = |i: usize| model.nominal(i, w) / model.nominal(reference, w);
         let ratio = |i: usize| phasor(i) / phasor(reference) / expected(i);
+        // Of the mean of the converter's records.
+        let variance = |converter: usize| {
+            let records = self.records_of(converter);
+            let amplitude = self.tone(sines, records.start, t, Sense::Forward).amplitude;
+            (amplitude.sigma / amplitude.value).powi(2) / records.len() as f64
+        };
         let sigmas = |converter: usize| {
             let [i, r] = [converter, reference].map(|converter| self.records_of(converter).start);
             let [own, other] = [i, r].map(|i| self.component(i, Sense::Forward));
@@ -120,11 +128,8 @@ impl<'a> ToneRecords<'a> {
             };
             let single = Complex::new(ratio.gain.sigma / ratio.gain.value, phase);
             // The noise of several records averages, the error of the frequency does not.
-            let averaged = |converter: usize| {
-                let records = self.records_of(converter);
-                let amplitude = self.tone(sines, records.start, t, Sense::Forward).amplitude;
-                (amplitude.sigma / amplitude.value).powi(2) * (1.0 - 1.0 / records.len() as f64)
-            };
+            let averaged =
+                |converter: usize| variance(converter) * (self.records_of(converter).len() - 1) as f64;
             let less = averaged(converter) + averaged(reference);
             if less == 0.0 {
                 return single;
@@ -134,7 +139,8 @@ impl<'a> ToneRecords<'a> {
         };
         let all = 0..model.channels();
         let (ratios, sigmas) = (all.clone().map(ratio).collect(), all.map(sigmas).collect());
-        TonePhasors { w, cycles: frequency / sines.rate, frequency, ratios, sigmas }
+        let reference_variance = variance(reference);
+        TonePhasors { w, cycles: frequency / sines.rate, frequency, ratios, sigmas, reference_variance }
     }
 
     /// The exponential that is the tone: the larger one over all records, forward for real samples.

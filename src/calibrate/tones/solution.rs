@@ -2,15 +2,14 @@
 
 use super::Tones;
 use super::ambiguity::{modulus, nearest_delay};
-use super::channel::{ChannelSolution, RatioFit};
 use super::phasors::TonePhasors;
+use super::ratios::solve_ratios;
 use crate::calibrate::CalibrationSettings;
 use crate::calibrate::error::CalibrateError;
 use crate::calibrate::estimates::Fitted;
 use crate::calibrate::fit::{ChannelParameter, FittedValues};
-use crate::calibrate::model::{ChannelModel, ChannelValues};
+use crate::calibrate::model::ChannelModel;
 use crate::calibrate::warning::CalibrationWarning;
-use crate::linalg::Mat;
 use crate::spec::{Cutoff, Spec};
 use crate::units::FastPeriods;
 
@@ -28,7 +27,7 @@ pub(super) const CUTOFF_TONES: usize = 3;
 /// as far at most.
 const DOUBTFUL_SHARE: f64 = 0.25;
 
-/// Least squares over the tones of all acquisitions, channel by channel.
+/// Least squares over the tones of all acquisitions.
 pub(super) fn solve(
     model: &ChannelModel,
     all: &[Tones],
@@ -38,50 +37,27 @@ pub(super) fn solve(
     let CalibrationSettings { fit, reference } = settings;
     let tones: Vec<&TonePhasors> = all.iter().flat_map(|tones| &tones.measured).collect();
     let frames = all.iter().map(|tones| tones.frames).sum();
-    let point = ChannelValues::nominal(model, fit, reference);
-    let (count, parameters) = (fit.kinds().len(), point.parameters.len());
-    let mut fitted = Fitted::new(point, Mat::zeros(parameters, parameters), frames);
+    let solution = solve_ratios(model, &all.iter().collect::<Vec<_>>(), settings)?;
+    let of_reference = solution.cutoff_sigma(reference);
+    let mut fitted = Fitted::new(solution.point, solution.covariance, frames);
     fitted.modulus = modulus(&tones);
-    let channels = solve_channels(model, &tones, settings)?;
-    for (k, i) in model.others(reference).enumerate() {
+    for i in model.others(reference) {
         let delay = nearest_delay(&tones, i, model.ratio as f64);
         if let Some(modulus) = fitted.modulus.filter(|_| fit.delay)
             && delay.abs() > DOUBTFUL_SHARE * modulus.0
         {
             warnings.push(CalibrationWarning::DelayModulo { channel: i + 1, modulus });
         }
-        let at = (k * count, k * count);
-        fitted.covariance.view_mut(at, (count, count)).copy_from(&channels[k].covariance);
     }
-    let values: Vec<f64> = channels.iter().flat_map(|channel| channel.values.iter().copied()).collect();
-    fitted.point.advance(&values);
+    if fit.cutoff.is_some() && of_reference.is_none() {
+        warnings.push(CalibrationWarning::CutoffsRelative { reference: reference + 1 });
+    }
     if fit.delay && fit.cutoff.is_none() {
         warnings.push(CalibrationWarning::CutoffAssumed { delay: cutoff_effect(model, &tones, reference) });
     }
-    let squares = channels.iter().map(|channel| channel.squares).sum();
-    let misfit = fitted.widen(squares, channels.iter().map(|channel| channel.freedom).sum());
+    let misfit = fitted.widen(solution.squares, solution.freedom);
     fitted.warnings.extend(misfit.map(|misfit| CalibrationWarning::TonesDisagree { misfit }));
     Ok(fitted)
-}
-
-/// The fits of all channels but the reference.
-fn solve_channels(
-    model: &ChannelModel,
-    tones: &[&TonePhasors],
-    CalibrationSettings { fit, reference }: CalibrationSettings,
-) -> Result<Vec<ChannelSolution>, CalibrateError> {
-    let solve = |i| {
-        let delay = nearest_delay(tones, i, model.ratio as f64);
-        RatioFit::new(model, i, fit, tones, delay).solve()
-    };
-    model.others(reference).map(solve).collect()
-}
-
-/// Square root of chi squared per degree of freedom of all channels, if there are any.
-fn misfit(channels: &[ChannelSolution]) -> Option<f64> {
-    let squares: f64 = channels.iter().map(|channel| channel.squares).sum();
-    let freedom: usize = channels.iter().map(|channel| channel.freedom).sum();
-    (freedom > 0).then(|| (squares / freedom as f64).sqrt())
 }
 
 /// The acquisitions without which the others agree: the one that explains most of the misfit of all, then
@@ -94,8 +70,8 @@ pub(super) fn outlying(
 ) -> Vec<CalibrationWarning> {
     // Tones that no longer determine the values tell nothing of their agreement.
     let misfit_of = |list: &[usize]| {
-        let tones: Vec<&TonePhasors> = list.iter().flat_map(|&k| &all[k].measured).collect();
-        misfit(&solve_channels(model, &tones, settings).ok()?)
+        let tones: Vec<&Tones> = list.iter().map(|&k| &all[k]).collect();
+        solve_ratios(model, &tones, settings).ok()?.misfit()
     };
     let (mut left, mut warnings): (Vec<usize>, _) = ((0..all.len()).collect(), Vec::new());
     while left.len() >= OUTLYING_OF
@@ -122,34 +98,28 @@ pub(super) fn explained(
     settings: CalibrationSettings,
     fitted: &mut Fitted,
 ) -> Option<CalibrationWarning> {
-    let tones: Vec<&TonePhasors> = all.iter().flat_map(|tones| &tones.measured).collect();
-    if distinct(tones.iter().copied()) < CUTOFF_TONES {
+    if distinct(all.iter().flat_map(|tones| &tones.measured)) < CUTOFF_TONES {
         return None;
     }
+    let tones: Vec<&Tones> = all.iter().collect();
     let stages = spec.channels.iter().map(|channel| channel.filter.stages().len()).min().unwrap_or(0);
     let parts = (0..stages).filter(|_| stages > 1).map(Cutoff::Stage).chain([Cutoff::Whole]);
     // A part that cannot be fitted explains nothing.
     let candidate = |part: Cutoff| {
         let fit = FittedValues { cutoff: Some(part), ..settings.fit };
-        let channels =
-            solve_channels(&model.scaling(part, spec).ok()?, &tones, CalibrationSettings { fit, ..settings });
-        let channels = channels.ok()?;
-        Some((fit, misfit(&channels)?, channels))
+        let model = model.scaling(part, spec).ok()?;
+        let solution = solve_ratios(&model, &tones, CalibrationSettings { fit, ..settings }).ok()?;
+        Some((fit, solution.misfit()?, solution.point))
     };
     let all = parts.filter(|&part| settings.fit.cutoff != Some(part)).filter_map(candidate);
-    let (fit, misfit, channels) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (fit, misfit, point) = all.min_by(|a, b| a.1.total_cmp(&b.1))?;
     if fitted.misfit? < EXPLAINED_RATIO * misfit.max(1.0) {
         return None;
     }
-    let own = solve_channels(model, &tones, settings).ok()?;
-    for ((i, own), other) in model.others(settings.reference).zip(own).zip(channels) {
-        for (kind, own) in settings.fit.kinds().into_iter().zip(own.values) {
-            let other = fit.kinds().into_iter().zip(&other.values).find(|(other, _)| *other == kind);
-            // Factors of different filters do not compare.
-            if let Some((_, other)) = other.filter(|_| kind != ChannelParameter::Cutoff) {
-                fitted.reach(i, kind, other - own);
-            }
-        }
+    // Factors of different filters do not compare.
+    let parameters = fitted.point.parameters.clone().into_iter();
+    for parameter in parameters.filter(|parameter| parameter.kind != ChannelParameter::Cutoff) {
+        fitted.reach(parameter, point.value(parameter) - fitted.point.value(parameter));
     }
     Some(CalibrationWarning::CutoffExplains { fit, misfit })
 }

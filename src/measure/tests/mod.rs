@@ -482,8 +482,42 @@ fn ends_that_have_not_settled_are_found() {
     let rest = measured(&late[ends.samples..late.len() - ends.samples]);
     assert!(rest.unsettled_ends.is_none());
     assert!(rest.snr.0 > found.snr.0 + ends.raise.0 - 1.0, "{} {} {ends:?}", rest.snr, found.snr);
+    // Their leakage is no spur.
+    assert_eq!((found.sfdr, &found.spurs), (rest.sfdr, &rest.spurs));
     // Noise that grows all along, and a loud middle, are no ends.
     let grown: Vec<f64> =
         tone.iter().zip(&noisy).enumerate().map(|(n, (x, y))| x + (y - x) * n as f64 / 100.0).collect();
     assert_eq!(measured(&grown).unsettled_ends, None);
+}
+
+/// Whatever decides SFDR is the first of the spurs, a line or the largest bin.
+#[test]
+fn what_decides_sfdr_is_among_the_spurs() {
+    let mut random = Random(6);
+    for (spur, noise) in [(1e-3, 1e-5), (0.0, 1e-2), (1e-4, 1e-3)] {
+        let wave = |n: usize| (0.7317 * n as f64).sin() + spur * (1.9 * n as f64).sin();
+        let samples: Vec<f64> = (0..4096).map(|n| 0.9 * wave(n) + noise * gaussian(&mut random)).collect();
+        for window in [Window::None, Window::Bh7] {
+            let found = measure(&samples, RATE, &Settings { window, ..Settings::default() }).unwrap();
+            close(-found.spurs[0].level.0, found.sfdr.0, 1e-12);
+        }
+    }
+}
+
+/// What a curve of each converter makes of a tone is taken out, and noise has none.
+#[test]
+fn a_static_nonlinearity_is_told_from_noise() {
+    let mut random = Random(7);
+    let bent = |curves: [f64; 2], random: &mut Random| -> Vec<f64> {
+        let one = |n: usize, random: &mut Random| {
+            let x = 0.9 * (0.7317 * n as f64).sin();
+            x + curves[n % 2] * (4.0 * x.powi(3) - 3.0 * x) + 1e-5 * gaussian(random)
+        };
+        (0..16_384).map(|n| one(n, random)).collect()
+    };
+    let settings = Settings { converters: 2, ..Settings::default() };
+    let found = measure(&bent([1e-3, -5e-4], &mut random), RATE, &settings).unwrap();
+    assert!(found.thd_straightened.is_some_and(|thd| thd.0 < found.thd.0 - 20.0), "{:?}", found.thd);
+    let found = measure(&bent([0.0, 0.0], &mut random), RATE, &settings).unwrap();
+    assert_eq!(found.thd_straightened, None);
 }

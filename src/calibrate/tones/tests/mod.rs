@@ -1,6 +1,7 @@
 //! Tones against closed forms: the bound in every zone, coverage, and every trap.
 
 mod complex;
+mod intervals;
 mod pooled;
 mod stages;
 

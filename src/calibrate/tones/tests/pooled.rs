@@ -11,7 +11,7 @@ use crate::calibrate::{
 };
 use crate::random::Random;
 use crate::spec::Spec;
-use crate::units::Hertz;
+use crate::units::{FastPeriods, Hertz};
 
 /// One tone for each acquisition.
 const LIST: [f64; 6] = [41e3, 203e3, 97e3, 301e3, 166e3, 467e3];
@@ -84,8 +84,8 @@ fn faults_name_the_acquisition() {
     let short = pooled(&spec, &all, &LIST).unwrap_err().to_string();
     assert!(short.starts_with("b: captures: 3, but channels in the spec: 4"), "{short}");
     let any = [Acquisition { name: "a", records: &all[0] }; 2];
-    let refused =
-        calibrate_pooled(&spec, &any, &CalibrationSignal::Any, CalibrationSettings::default()).unwrap_err();
+    let waveform = CalibrationSignal::Waveform { samples: vec![0.0; 64], spacing: FastPeriods(1.0) };
+    let refused = calibrate_pooled(&spec, &any, &waveform, CalibrationSettings::default()).unwrap_err();
     assert_eq!(refused, CalibrateError::NotPooled { acquisitions: 2 });
 }
 

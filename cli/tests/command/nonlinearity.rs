@@ -1,0 +1,93 @@
+//! The static nonlinearity of converters: simulated, found by tones, and corrected before the filters.
+
+use crate::calibrate::design;
+use crate::support::{Desk, number, text};
+use hybank::spec::Spec;
+
+/// Four interleaved converters of 250 MS/s and 12 bits.
+const NOMINAL: &str = r#"fast_rate = "1 GS/s"
+ratio = 4
+[target]
+filter = { family = "butterworth", order = 2, cutoff = "700 MHz" }
+[[channel]]
+delay_samples = 3
+[[channel]]
+delay_samples = 2
+[[channel]]
+delay_samples = 1
+[[channel]]
+delay_samples = 0
+[signal]
+band = "400 MHz"
+[design]
+method = "fir"
+taps = 48
+"#;
+
+/// Half a step of 12 bits, of full scale.
+const HALF_STEP: f64 = 1.0 / 4096.0;
+
+/// The same with curves of half a step each.
+fn bent() -> String {
+    let mut spec = Spec::from_toml(NOMINAL, "spec.toml").unwrap();
+    let shares = [[0.6, 0.3, -0.1], [-0.5, 0.4, 0.1], [0.2, -0.7, 0.1], [0.3, 0.5, -0.2]];
+    for (channel, shares) in spec.channels.iter_mut().zip(shares) {
+        channel.nonlinearity = shares.map(|share| share * HALF_STEP).to_vec();
+    }
+    spec.to_toml_like(NOMINAL, &|_| unreachable!()).unwrap()
+}
+
+fn capture(desk: &Desk, source: &str, folder: &str) {
+    let simulate = ["simulate", "bent.toml", "--source", source, "--samples", "65536", "--gain", "0.9"];
+    desk.good(&[&simulate[..], &["--bits", "12", "--noise", "1e-4", "--seed", "3", "-o", folder]].concat());
+}
+
+fn four(folder: &str) -> [String; 4] {
+    [1, 2, 3, 4].map(|i| format!("{folder}/ch{i}.wav"))
+}
+
+/// SFDR of a tone that `bank.json` fuses.
+fn sfdr(desk: &Desk) -> f64 {
+    let files = four("judged");
+    let names = files.each_ref().map(String::as_str);
+    desk.good(&[&["fuse", "bank.json"][..], &names, &["-o", "fused.wav", "--force"]].concat());
+    number(&desk.json(&["measure", "fused.wav", "--skip", "500", "--json"]), "/sfdr_db")
+}
+
+#[test]
+fn a_nonlinearity_of_half_a_step_is_found_and_taken_out() {
+    let desk = Desk::with_spec(NOMINAL);
+    desk.write("bent.toml", bent());
+    capture(&desk, "tones:61.37MHz", "judged");
+    let mut files = Vec::new();
+    for tone in ["41.13MHz", "113.57MHz", "207.91MHz", "331.73MHz"] {
+        let folder = tone.replace('.', "_");
+        capture(&desk, &format!("tones:{tone}"), &folder);
+        files.extend(four(&folder));
+    }
+    let names: Vec<&str> = files.iter().map(String::as_str).collect();
+    // Without the curves the tones contradict each other, which is said.
+    let calibrate = |output: &str, more: &[&str]| {
+        let shown = desk
+            .run(&[&["calibrate", "spec.toml"][..], &names, &["-o", output, "--json"], more].concat(), &[]);
+        assert!(shown.status.success(), "{shown:?}");
+        text(&shown.stdout)
+    };
+    calibrate("plain.toml", &[]);
+    design(&desk, "plain.toml");
+    let before = sfdr(&desk);
+    let report = calibrate("straight.toml", &["--nonlinearity", "8"]);
+    let found = Spec::from_toml(&String::from_utf8(desk.read("straight.toml")).unwrap(), "straight.toml");
+    let truth = Spec::from_toml(&bent(), "bent.toml").unwrap();
+    for (found, truth) in found.unwrap().channels.iter().zip(&truth.channels) {
+        let error = |k: usize| found.nonlinearity[k] - truth.nonlinearity[k];
+        assert!((0..3).all(|k| error(k).abs() < 0.05 * HALF_STEP), "{report}");
+    }
+    design(&desk, "straight.toml");
+    let after = sfdr(&desk);
+    println!("SFDR {before:.1} dB without, {after:.1} dB with the nonlinearity");
+    assert!(after > before + 15.0, "{before} {after}");
+    // Curves have no place in other tools.
+    let refused = desk.run(&["export", "bank.json", "--format", "c", "-o", "bank.h"], &[]);
+    assert!(!refused.status.success() && String::from_utf8_lossy(&refused.stderr).contains("nonlinearity"));
+}
