@@ -36,8 +36,7 @@ pub struct Tracked {
 #[derive(Debug)]
 pub struct TrackedFusion {
     fusion: LiveFusion,
-    offsets: Vec<f64>,
-    ratio: usize,
+    bank: Bank,
     /// Frames so far.
     frames: usize,
     course: InnerCourse,
@@ -66,7 +65,7 @@ impl TrackedFusion {
         let estimator = design::instants_estimator(bank, settings.longest(&recordings))?;
         let fusion = LiveFusion::new(estimator, recordings, settings.first, REACH);
         let course = InnerCourse::new(bank.fast_period * fusion.block() as f64);
-        Ok(Self { fusion, offsets: bank.offsets.clone(), ratio: bank.ratio, frames: 0, course })
+        Ok(Self { fusion, bank: bank.clone(), frames: 0, course })
     }
 
     /// Takes the next samples of each channel, as many of all, and gives the outputs that depend on no later
@@ -76,9 +75,10 @@ impl TrackedFusion {
     /// [`MergeError::Singular`].
     pub fn push(&mut self, channels: &[Vec<f64>]) -> Result<Vec<f64>, MergeError> {
         self.frames += channels.iter().map(Vec::len).min().unwrap_or(0);
-        let own =
-            |(samples, offset): (&Vec<f64>, &f64)| samples.iter().map(|x| x - offset).collect::<Vec<f64>>();
-        let fused = self.fusion.push(channels.iter().zip(&self.offsets).map(own))?;
+        let own = |(i, samples): (usize, &Vec<f64>)| {
+            samples.iter().map(|x| self.bank.corrected(i, *x)).collect::<Vec<f64>>()
+        };
+        let fused = self.fusion.push(channels.iter().enumerate().map(own))?;
         Ok(self.course.judged(fused))
     }
 
@@ -87,11 +87,11 @@ impl TrackedFusion {
     /// # Errors
     /// [`MergeError::NoSamples`] if there were none; as [`TrackedFusion::push`].
     pub fn finish(self) -> Result<(Vec<f64>, PredictedQuality), MergeError> {
-        let Self { fusion, ratio, frames, mut course, .. } = self;
+        let Self { fusion, bank, frames, mut course } = self;
         if frames == 0 {
             return Err(MergeError::NoSamples);
         }
-        let fused = fusion.finish(frames.saturating_mul(ratio))?;
+        let fused = fusion.finish(frames.saturating_mul(bank.ratio))?;
         Ok((course.judged(fused), course.quality()))
     }
 }
@@ -145,7 +145,7 @@ pub fn fuse_stamped(
     let settings = FusionSettings { first: FastPeriods(begin), count, reach: REACH };
     check_memory(settings.count)?;
     let recording = |((i, samples), clock): ((usize, &Vec<f64>), Clock)| {
-        Recording::new(samples.iter().map(|x| x - bank.offsets[i]).collect(), clock, i)
+        Recording::new(samples.iter().map(|x| bank.corrected(i, *x)).collect(), clock, i)
     };
     let recordings: Vec<Recording> = channels.iter().enumerate().zip(clocks).map(recording).collect();
     let estimator = design::instants_estimator(bank, settings.longest(&recordings))?;

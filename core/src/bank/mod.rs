@@ -22,7 +22,7 @@ pub use taps::FixedPoint;
 pub use crate::runtime::StateMatrices;
 pub use crate::spec::{FrameLayout, FrameSample};
 
-use crate::runtime::{BuildError, Options, Plan, Shape};
+use crate::runtime::{BuildError, Options, Plan, Shape, nonlinearity};
 use crate::spec::{ErrorPoint, Method, Spec};
 use crate::units::{FastPeriods, GridTime, Seconds};
 
@@ -260,6 +260,11 @@ impl Bank {
             true => Vec::new(),
             false => self.layout().each(&self.nonlinearity),
         }
+    }
+
+    /// A sample of a converter without its nonlinearity and its offset, as plans correct it.
+    pub fn corrected(&self, converter: usize, x: f64) -> f64 {
+        x - nonlinearity(&self.nonlinearity[converter], x) - self.offsets[converter]
     }
 
     /// Whether no converter has a nonlinearity that is corrected.
