@@ -12,7 +12,7 @@ address=${1:?tools/release.sh ADDRESS [FOLDER]}
 build=${CARGO_TARGET_DIR:-$PWD/target}
 folder=${2:-$build/release-candidate}
 version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Cargo.toml)
-# Bytes of a packed crate; crates.io takes 10 MiB. CONTRIBUTING.md has the sizes.
+# Bytes of a packed crate; crates.io takes 10 MiB.
 most=1500000
 # In the order of dependence.
 crates=(hybank-linalg hybank-runtime hybank-sampling hybank-core hybank-instants hybank-program hybank hybank-ibr hybank-cli)
