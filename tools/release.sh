@@ -12,7 +12,7 @@ address=${1:?tools/release.sh ADDRESS [FOLDER]}
 build=${CARGO_TARGET_DIR:-$PWD/target}
 folder=${2:-$build/release-candidate}
 version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Cargo.toml)
-# Bytes of a packed crate; crates.io takes 10 MiB. CONTRIBUTING.md has the sizes.
+# Bytes of a packed crate; crates.io takes 10 MiB.
 most=1500000
 # In the order of dependence.
 crates=(hybank-linalg hybank-runtime hybank-sampling hybank-core hybank-instants hybank-program hybank hybank-ibr hybank-cli)
@@ -34,6 +34,8 @@ sed -i "s|^\[project.optional-dependencies\]|[project.urls]\nRepository = \"$add
 # The pages of the registries, each with the folder from which its links lead.
 for page in README.md {linalg,runtime,sampling,core,program,ibr}/README.md docs/python.md; do
     base=$(dirname "$page")/
+    # A picture is the file itself, not the page around it.
+    sed -Ei "s|(!\[[^]]*\]\()([A-Za-z0-9_./-]+)\)|\1${address}/raw/v$version/${base#./}\2)|g" "$page"
     sed -Ei "s|\]\(([A-Za-z0-9_./-]+)(#[a-z0-9-]+)?\)|](${address}/blob/v$version/${base#./}\1\2)|g" "$page"
     if grep -nE '\]\([^)#:]+[)#]' "$page"; then
         echo "release: $page has links that lead nowhere on the page of a registry" >&2

@@ -1,6 +1,11 @@
 //! Interval arithmetic with midpoint and radius. The midpoint has 106 bits (or 512), and every operation
 //! adds a bound of its rounding error to the radius. A result encloses the exact result for all values in
-//! the operands; docs/proof.md derives this, down to numbers that no double holds.
+//! the operands.
+//!
+//! Radii are doubles. That of x y, for example, is |x| r_y + |y| r_x + r_x r_y, and each result is
+//! multiplied by [`OUTWARD`], which is more than the dozen roundings in it can take away. A midpoint below
+//! all doubles counts as 1e-290 in a radius; a divisor that reaches out of the normal doubles, and a radius
+//! that overflows, make the result unknown, and what is unknown proves nothing.
 
 use super::{DoubleDouble, Float, Float512};
 use std::ops::{Add, Div, Mul, Neg, Sub};

@@ -3,8 +3,30 @@
 //! A number of B bits is `sign * m * 2^(exponent - B)` with an integer m of B / 64 words whose top bit is
 //! set, so that `2^(exponent - 1) <= |x| < 2^exponent`. Sums and products are computed in integers and drop
 //! what does not fit: their relative error is below 2^(2 - B). Quotients and roots take Newton's iteration
-//! and a last step with the residual; theirs is below 2^(4 - B) (docs/proof.md derives both). An exponent
-//! beyond [`MAX_EXPONENT`] makes a number unknown, so that nothing overflows or underflows unseen.
+//! and a last step with the residual; theirs is below 2^(4 - B). An exponent beyond [`MAX_EXPONENT`] makes a
+//! number unknown, so that nothing overflows or underflows unseen.
+//!
+//! For B = 512, with mu = 2^-510:
+//!
+//! - *Product.* The integers are multiplied exactly, and the first 512 bits are kept: the relative error is
+//!   below 2^-511.
+//! - *Sum.* The smaller number is shifted and cut 64 bits below the mantissa of the larger one, where 2^e
+//!   bounds the larger one: the cut drops less than 2^(e - 576). It drops something only where the exponents
+//!   differ by more than 64, and then the sum or difference is at least 2^(e - 2). With the 512 bits that
+//!   are kept at the end the relative error is below 2^-574 + 2^-511 < mu.
+//! - *Quotient x / d*, 1/2 <= d < 1. The inverse y of d starts from a double with a relative error below
+//!   2^-51. With y = (1 + delta) / d, one step y + y (1 - d y) gives (1 - delta^2) / d without rounding. The
+//!   rounding of d y adds at most (1 + delta)^2 mu, the last sum mu, and the other two operations 2 mu
+//!   |delta|, since 1 - d y is near -delta. So |delta| becomes at most delta^2 + 3 mu: 2^-102, 2^-203,
+//!   2^-405 and then below 4 mu. The quotient q = x y has an error eta below 6 mu. The last step q + (x - q
+//!   d) y removes eta up to eta times small factors: the rounding of q d adds mu, the last sum mu, and the
+//!   rest is of second order. The quotient is right to 3 mu < 2^-508.
+//! - *Root of m*, 1/2 <= m < 2. The inverse root y = (1 + delta) / sqrt(m) starts below 2^-51 too. One step
+//!   y + y (1 - m y^2) / 2 gives an error of at most (3/2) delta^2 + |delta|^3 / 2 without rounding. The two
+//!   products in m y^2 add 2 mu / 2, the last sum mu, the rest less than mu. So |delta| becomes at most
+//!   2 delta^2 + 3 mu: 2^-101, 2^-201, 2^-401 and then below 4 mu. r = m y has an error below 6 mu, and the
+//!   last step r + (m - r^2) y / 2 leaves mu / 2 from r^2, mu from the sum and terms of second order: less
+//!   than 2 mu < 2^-508.
 
 use super::number::Float;
 use std::cmp::Ordering;

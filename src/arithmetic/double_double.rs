@@ -3,8 +3,15 @@
 //! The algorithms are those of M. Joldes, J.-M. Muller, V. Popescu, *Tight and rigorous error bounds for
 //! basic building blocks of double-word arithmetic*, ACM TOMS 44 (2017): AccurateDWPlusDW (error 3 u^2) and
 //! DWTimesDW3 (5 u^2) with u = 2^-53; a quotient with the remainder by fused multiply-adds (19 u^2) and the
-//! root with one Newton step (5 u^2), for which docs/proof.md derives the bounds. All of them are below
-//! [`ROUNDING`] = 64 u^2 relative; results that underflow are off by less than 2^-1070.
+//! root with one Newton step (5 u^2). All of them are below [`ROUNDING`] = 64 u^2 relative; results that
+//! underflow are off by less than 2^-1070. With x = xh + xl, |xl| <= u |xh|:
+//!
+//! - *Quotient x / y.* t = xh / yh, rounded. The product y t is formed with fused multiply-adds as rh + rl
+//!   with an error of at most 2 u^2 |xh|. |x - y t| <= 3.1 u |xh|, so xh - rh is exact, the rounding of xl -
+//!   rl is below 2.1 u^2 |xh|, and that of their sum below 5.2 u^2 |xh|. The rest divided by yh in place of
+//!   y and rounded adds (3.2 + 5.3) u^2 |x / y|. In sum the quotient is right to 19 u^2.
+//! - *Root.* r = sqrt(xh), rounded; xh - r^2 is exact by a fused multiply-add. Adding xl and dividing by 2 r
+//!   rounds twice, 1.6 u^2 each, and 2 r stands for r + sqrt(x): 1.3 u^2. In sum 5 u^2.
 
 use super::number::Float;
 use std::ops::{Add, Div, Mul, Neg, Sub};

@@ -30,6 +30,16 @@ fn every_example_runs() {
     }
 }
 
+/// One converter shows a tone at a wrong frequency, two in turn show three images, and fused there are none.
+#[test]
+fn the_picture_of_the_readme_has_false_lines_until_it_is_fused() {
+    let output = Command::new(built().join("spectra")).output().unwrap();
+    let picture = String::from_utf8(output.stdout).unwrap();
+    let panels: Vec<&str> = picture.split("<g ").skip(1).collect();
+    let seen: Vec<bool> = panels.iter().map(|panel| panel.contains("class=\"false\"")).collect();
+    assert_eq!(seen, [true, true, false]);
+}
+
 /// All ten figures and the table, with the numbers that are known of the thesis's FIR example.
 #[test]
 fn the_thesis_is_drawn_again() {

@@ -4,7 +4,7 @@
 //! samples as exact quotients, gains as singular values, optima by methods of its own.
 //!
 //! `HYBANK_CAMPAIGN=20` makes 20 times as many cases, `HYBANK_TRIALS=124..125` that one. `-- --nocapture`
-//! shows the tables of docs/audit.md.
+//! shows the tables.
 
 #[path = "../support/mod.rs"]
 mod support;

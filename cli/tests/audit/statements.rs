@@ -91,7 +91,7 @@ impl Tally {
         }
     }
 
-    /// A row of the table in docs/audit.md. Fails if a statement was refuted.
+    /// A row of the printed table. Fails if a statement was refuted.
     pub(crate) fn report(&self, campaign: &str) {
         let ends = |list: &[f64]| {
             let mut list = list.to_vec();

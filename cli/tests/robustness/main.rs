@@ -2,7 +2,7 @@
 //!
 //! Every run makes a short campaign with the same seeds.
 //! `HYBANK_CAMPAIGN=50 cargo test --release --test robustness -- --nocapture` makes 50 times as many trials;
-//! the counts are printed. `docs/robustness.md` has them.
+//! the counts are printed.
 
 #[path = "../support/mod.rs"]
 mod support;

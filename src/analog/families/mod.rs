@@ -5,7 +5,10 @@
 //! moves it. The DC gain also follows scipy: 1, except `-ripple_db` for Chebyshev 1 and elliptic filters
 //! of even order.
 //!
-//! All are formulas in balls of 512 bits. Doubles are these numbers, rounded.
+//! All are formulas in balls of 512 bits. Doubles are these numbers, rounded. Angles are powers of one cos +
+//! i sin, and e^mu is the n-th root of S + sqrt(1 + S^2) for mu = asinh(S) / n. The polynomials of Bessel
+//! filters have integer coefficients; their roots are enclosed as those of a denominator. The roots of a
+//! band-pass are u ± sqrt(u^2 - w^2).
 
 mod elliptic;
 mod passband;

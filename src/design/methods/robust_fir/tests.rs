@@ -143,7 +143,7 @@ fn no_corner_is_worse_than_what_was_found() {
 }
 
 /// What a robust design wins over the bank that takes the errors for zero, in per cent of its largest gain:
-/// the table of docs/uncertainty.md, with HYBANK_SLOW set. Without it, one row of it.
+/// a table, with HYBANK_SLOW set. Without it, one row of it. docs/uncertainty.md has its ranges.
 #[test]
 fn robust_designs_reach_their_bound_and_win_what_the_table_says() {
     let filters = [
