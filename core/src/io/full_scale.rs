@@ -265,6 +265,8 @@ impl Scaling {
         let (at, sample) = block.parts.iter().find_map(find).unwrap_or((0, f64::NAN));
         let scale = self.scale.unwrap_or(FullScale::Number(1.0));
         let code = sample * scale.amplitude() + scale.middle();
+        // Samples of words are codes up to the rounding of single precision.
+        let code = if self.word.is_some() { code.round() } else { code };
         let (frame, channel) = (self.frames + (at / channels) as u64, at % channels + 1);
         let from_0 = match scale {
             FullScale::Signed(bits) if self.seen.least >= 0.0 => {
@@ -462,7 +464,7 @@ mod tests {
             [1.0, -1.0]
         );
         let beyond = scaled(header(PcmFormat::S16Le), thousand, &words(&[1, 1001])).unwrap_err();
-        assert!(beyond.contains("frame 1 (from 0) of channel 1 has the code 1001"), "{beyond}");
+        assert!(beyond.contains("frame 1 (from 0) of channel 1 has the code 1001,"), "{beyond}");
     }
 
     #[test]
