@@ -46,8 +46,8 @@ pub(super) struct InstantArgs {
 pub(super) struct TrackArgs {
     /// Follow delays that change: drift.jsonl of `align --trim`, or a table (.csv) of a time and the delay
     /// of each channel, both in seconds, with headings, as `time,delay 1,delay 2`. Taps are made for the
-    /// delays at hand in place of those of the spec; lost samples are left out. `stream` gives the samples of
-    /// `fuse`, blocks of 64 frames as soon as the 38 frames after them are there
+    /// delays at hand in place of those of the spec; lost samples are left out. `stream` gives the samples
+    /// of `fuse`, blocks of 64 frames as soon as the 38 frames after them are there
     #[arg(long, value_name = "FILE", conflicts_with_all =
           ["algorithm", "gaps", "report", "interleaved", "threads"])]
     track: Option<PathBuf>,

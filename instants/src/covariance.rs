@@ -111,8 +111,8 @@ impl Economy {
     }
 }
 
-/// The sums of terms at `count` times. A time is one of few and a step of few more, and a term the product of
-/// two phasors, so the sums are products of matrices.
+/// The sums of terms at `count` times. A time is one of few and a step of few more, and a term the product
+/// of two phasors, so the sums are products of matrices.
 fn sums(terms: &[Term], first: f64, step: f64, count: usize) -> Vec<f64> {
     let begins: Vec<f64> = (0..count).step_by(RENEWAL).map(|n| first + n as f64 * step).collect();
     let mut values = Mat::zeros(RENEWAL, begins.len());

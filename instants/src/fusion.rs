@@ -152,8 +152,8 @@ pub(super) struct KnownInstantFusion<'a> {
 }
 
 impl KnownInstantFusion<'_> {
-    /// The taps of a stretch; `None` if its samples do not come at nearly the common rate. Only the clocks of
-    /// the recordings matter.
+    /// The taps of a stretch; `None` if its samples do not come at nearly the common rate. Only the clocks
+    /// of the recordings matter.
     pub(super) fn stretch(&self, frames: Range<usize>) -> Result<Option<Stretch>, LinalgError> {
         let is_even = |recording: &Recording| self.is_even(recording, &frames);
         let has_pattern = self.layout.is_common && self.recordings.iter().all(is_even);

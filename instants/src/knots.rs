@@ -2,8 +2,8 @@
 //!
 //! From frame to frame the samples move along with the outputs, only their offsets drift. So a set of taps
 //! serves for many frames, and between knots the taps are on parabolas. Knots lie at absolute frames, dense
-//! where taps change fast: an interval is halved as long as a curve through its ends and the knot beside it is
-//! worse in its middle than the best taps there, or the samples next to an output are at one instant
+//! where taps change fast: an interval is halved as long as a curve through its ends and the knot beside it
+//! is worse in its middle than the best taps there, or the samples next to an output are at one instant
 //! within it. There taps change sign within a ten thousandth of a period, which no look at the middle would
 //! find.
 

@@ -8,7 +8,8 @@ use crate::state::{Count, StateHeader, StateNumbers};
 use crate::{Plan, ProcessError, Sample, StateError};
 
 /// Filters the frames of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0 before the
-/// first frame, and x_i the samples without the [offsets](Plan::with_offsets) and nonlinearities of their converters.
+/// first frame, and x_i the samples without the [offsets](Plan::with_offsets) and nonlinearities of their
+/// converters.
 ///
 /// A frame is one sample of each of the N channels; each gives M output samples, p = 0..M - 1. All calls
 /// take whole frames and return the samples written. They allocate nothing and lock nothing (except those of

@@ -15,8 +15,8 @@
 //! are only noted.
 //!
 //! A delay and a gain that all channels have in common cannot be observed. One channel is the reference and
-//! keeps the values of the spec; its cut-off is fitted where tones tell it, or where the spec says how uncertain
-//! it is.
+//! keeps the values of the spec; its cut-off is fitted where tones tell it, or where the spec says how
+//! uncertain it is.
 //!
 //! # Intervals
 //! Every [`Estimate`](crate::sine_fit::Estimate) has its standard deviation: the Cramer-Rao bound for

@@ -102,9 +102,9 @@ pub(crate) fn refine<E>(
     Ok(best.folded())
 }
 
-/// Vertex of the parabola through three points, at least [`Settings::least_step`] of their width away from the best
-/// one (a shorter step finds the same gain up to rounding, wherever the peak is), or, where it is no use,
-/// a golden section of the longer side.
+/// Vertex of the parabola through three points, at least [`Settings::least_step`] of their width away from
+/// the best one (a shorter step finds the same gain up to rounding, wherever the peak is), or, where it is
+/// no use, a golden section of the longer side.
 fn next_abscissa(low: Peak, best: Peak, high: Peak, stalls: usize) -> f64 {
     const GOLDEN: f64 = 0.381_966_011_250_105_1;
     let (a, m, b) = (low.frequency, best.frequency, high.frequency);

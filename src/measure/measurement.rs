@@ -53,8 +53,8 @@ pub struct Measurement {
     /// Harmonics 2 .. H over signal.
     #[serde(rename = "thd_db")]
     pub thd: Decibels,
-    /// The same without the static nonlinearity of the converters that the record shows: a curve of the order
-    /// H for each. `None` for complex records, and where no curve lowers what the tones leave.
+    /// The same without the static nonlinearity of the converters that the record shows: a curve of the
+    /// order H for each. `None` for complex records, and where no curve lowers what the tones leave.
     #[serde(rename = "thd_straightened_db", skip_serializing_if = "Option::is_none")]
     pub thd_straightened: Option<Decibels>,
     /// H.

@@ -31,8 +31,8 @@ pub struct Tracked {
     pub quality: PredictedQuality,
 }
 
-/// The fusion of samples, NaN where they were lost, as they arrive at the converters of a bank. Taps are made
-/// for the delays of a table ([`crate::instants`]); those of the bank are not used.
+/// The fusion of samples, NaN where they were lost, as they arrive at the converters of a bank. Taps are
+/// made for the delays of a table ([`crate::instants`]); those of the bank are not used.
 #[derive(Debug)]
 pub struct TrackedFusion {
     fusion: LiveFusion,

@@ -19,9 +19,8 @@ const BENDING_STEPS: usize = 16;
 /// t_k = k T_i / (1 + drift) - D_i - delay error + jitter j_k
 /// ```
 ///
-/// with independent normal numbers n_k and j_k of variance 1, the quantiser q, and e(x) the sample y of which
-/// y - sum of a_k T_k(y) is x. The numbers depend on the
-/// seed, the channel and k only.
+/// with independent normal numbers n_k and j_k of variance 1, the quantiser q, and e(x) the sample y of
+/// which y - sum of a_k T_k(y) is x. The numbers depend on the seed, the channel and k only.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sampler {
     /// The true delay minus D_i.

@@ -6,8 +6,8 @@ use crate::linalg::least_squares::NormalEquations;
 /// A curve has to lower what is left of the parts left out by so many standard errors of that.
 const CLEAR_GAIN: f64 = 2.0;
 
-/// The equations of a curve sum of a_k T_k(x), k = 2 .. K, in parts of which each is left out in turn. What a
-/// fit of sines takes of the curve, its constant and the part along x, is free.
+/// The equations of a curve sum of a_k T_k(x), k = 2 .. K, in parts of which each is left out in turn. What
+/// a fit of sines takes of the curve, its constant and the part along x, is free.
 #[derive(Debug, Clone)]
 pub struct CurveFit {
     order: usize,
@@ -29,8 +29,8 @@ impl CurveFit {
         self.parts.push(equations);
     }
 
-    /// a_2, a_3, .. of the order that leaves least of the parts left out; none if that is not less than a line
-    /// leaves.
+    /// a_2, a_3, .. of the order that leaves least of the parts left out; none if that is not less than a
+    /// line leaves.
     pub fn curve(&self) -> Vec<f64> {
         let line = self.left_out(1);
         let judged = (2..=self.order).map(|order| (order, self.left_out(order)));

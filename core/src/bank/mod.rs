@@ -56,8 +56,8 @@ pub struct Bank {
     /// The offset o_i of each converter, relative to full scale. It is subtracted from the samples before
     /// the filters.
     pub offsets: Vec<f64>,
-    /// The static nonlinearity of each converter: a_k from k = 2 on of the sum of a_k T_k(x) that its sample x
-    /// contains, which is subtracted before the filters.
+    /// The static nonlinearity of each converter: a_k from k = 2 on of the sum of a_k T_k(x) that its sample
+    /// x contains, which is subtracted before the filters.
     pub nonlinearity: Vec<Vec<f64>>,
     /// The synthesis filters, one for each sample of a frame.
     pub filters: SynthesisFilters,

@@ -123,8 +123,8 @@ pub struct ChannelSpec {
     /// o_i: the converter's offset, relative to full scale.
     #[serde(skip_serializing_if = "is_zero")]
     pub offset: f64,
-    /// a_k from k = 2 on: a sample x also contains the sum of a_k T_k(x), with Chebyshev's polynomials, which
-    /// is subtracted before anything else.
+    /// a_k from k = 2 on: a sample x also contains the sum of a_k T_k(x), with Chebyshev's polynomials,
+    /// which is subtracted before anything else.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub nonlinearity: Vec<f64>,
 }

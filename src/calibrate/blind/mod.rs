@@ -10,8 +10,8 @@
 //! over the occupied aliases. Where they are fewer than the channels, A leaves directions that hold noise
 //! only, whatever the signal is, and these determine the ratios of A's rows. Signal S and noise s of each
 //! band of frequencies are free, so the weight of a band follows from its noise. The eigenvalues of its
-//! matrix show how many aliases it holds: p large ones are the p aliases in the band of the signal, or next to
-//! it, of these those of lowest frequency.
+//! matrix show how many aliases it holds: p large ones are the p aliases in the band of the signal, or next
+//! to it, of these those of lowest frequency.
 //!
 //! Fisher scoring finds the maximum; the inverse of the Fisher information is the covariance of the
 //! estimates.
@@ -290,10 +290,10 @@ impl<'a> Blind<'a> {
 }
 
 impl Maximum<'_> {
-    /// o_i. The signal's own mean is not known, so the reference keeps its offset, and an offset follows from
-    /// the difference y = x_i - x_r c_i / c_r, of which the signal near 0 Hz is gone. What noise and aliases of
-    /// 0 Hz, at multiples of the slow rate, leave of it is a stationary sequence, so the density of its lowest
-    /// frequencies is that at 0 Hz and gives the variance of its mean.
+    /// o_i. The signal's own mean is not known, so the reference keeps its offset, and an offset follows
+    /// from the difference y = x_i - x_r c_i / c_r, of which the signal near 0 Hz is gone. What noise and
+    /// aliases of 0 Hz, at multiples of the slow rate, leave of it is a stationary sequence, so the density
+    /// of its lowest frequencies is that at 0 Hz and gives the variance of its mean.
     fn offsets(&self, reference: usize) -> Vec<Estimate<f64>> {
         let Blind { model, spectra, .. } = self.blind;
         let of_spectra = |i: usize| spectra.iter().map(move |spectra| self.offset(spectra, i, reference));

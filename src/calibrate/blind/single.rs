@@ -64,8 +64,8 @@ impl SingleBand {
 }
 
 /// The share of the power that one alias per band leaves unexplained if capture i is channel `order[i]`,
-/// with the nominal values and whichever alias fits a band best, and one capture may be inverted. NaN without
-/// bands.
+/// with the nominal values and whichever alias fits a band best, and one capture may be inverted. NaN
+/// without bands.
 pub(in crate::calibrate) fn unexplained_in_order(
     bands: &[SingleBand],
     order: &[usize],

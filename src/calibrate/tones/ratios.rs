@@ -16,8 +16,8 @@ use crate::linalg::{Complex, Mat};
 
 /// A cut-off that is known to less than this share of itself is not known.
 const LARGEST_CUTOFF_ERROR: f64 = 0.1;
-/// The tones tell the cut-off of the reference if they leave a smaller standard deviation of its logarithm; and
-/// if they contradict each other without it only.
+/// The tones tell the cut-off of the reference if they leave a smaller standard deviation of its logarithm;
+/// and if they contradict each other without it only.
 const TOLD_CUTOFF: f64 = 1e-3;
 /// The iteration ends when all steps are below this share of the standard deviation ..
 const SMALL_STEP: f64 = 1e-6;

@@ -213,7 +213,8 @@ impl<F: Float> RiccatiSolver for PreciseFiltering<F> {
     }
 }
 
-/// Whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below -[`Settings::semidefinite`].
+/// Whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below
+/// -[`Settings::semidefinite`].
 fn is_semidefinite<F: Float>(m: &Matrix<F>) -> bool {
     let kept: Vec<usize> = (0..m.nrows()).filter(|&i| m[(i, i)].nearest() != 0.0).collect();
     if kept.iter().any(|&i| m[(i, i)].nearest() < 0.0) {

@@ -12,7 +12,8 @@ use std::io::Read;
 
 /// Most lines before the first one of numbers.
 const MOST_LINES: usize = 1000;
-/// Lines at hand after one with numbers in the chosen columns among which one of numbers alone is looked for.
+/// Lines at hand after one with numbers in the chosen columns among which one of numbers alone is looked
+/// for.
 const LOOKED_AHEAD: usize = 256;
 /// Lines above the first one of numbers in which headings are looked for.
 const HEADINGS_ABOVE: usize = 4;
