@@ -253,4 +253,7 @@ fn recordings_that_do_not_fit_are_refused_with_the_reason() {
     align(1, ["a.wav", "none.wav"], &all, &["none.wav"]);
     align(2, ["a.wav", "b.wav"], &["--reference", "0"], &["--reference 0"]);
     align(1, ["a.wav", "b.wav"], &["--reference", "3"], &["channel 3 cannot be the reference"]);
+    // Before anything is read.
+    desk.write("aligned.toml", "");
+    align(1, ["none.wav", "none.wav"], &all, &["aligned.toml", "--force"]);
 }
