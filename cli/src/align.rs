@@ -7,7 +7,7 @@ use super::capture_args::{CaptureArgs, check_stdin};
 use super::capture_file::{start, unread};
 use super::file_kind::FileKind;
 use super::print::{Failure, check_json, failed, failed_at, is_dash, say_understood, show, warn};
-use super::written::{Mono, begin_file, begin_recording, check_outputs, write_text, write_together};
+use super::written::{Mono, begin_file, begin_recording, check_together, write_text, write_together};
 use hybank::align::{AlignError, AlignSettings, AlignedChannel, Alignment, ClockStep, align};
 use hybank::calibrate::{CalibrateError, Record};
 use hybank::captures::{Captures, Converters};
@@ -116,11 +116,11 @@ impl Args {
         check_json(self.json, &self.output, "spec")
     }
 
-    /// Refuses outputs that are inputs; `others` are those beside the spec.
+    /// Refuses outputs that are inputs or must not be replaced; `others` are those beside the spec.
     fn check_outputs(&self, others: &[PathBuf]) -> Result<(), Failure> {
         let inputs: Vec<&Path> = self.captures.iter().chain([&self.spec]).map(PathBuf::as_path).collect();
         let outputs: Vec<&Path> = others.iter().chain([&self.output]).map(PathBuf::as_path).collect();
-        check_outputs(&outputs, &inputs)
+        check_together(&outputs, &inputs, self.force)
     }
 
     /// The outputs beside the spec: the recordings of so many channels, and the delays.

@@ -4,7 +4,7 @@ use super::bank_file::load_spec_or_bank;
 use super::print::{Failure, InFile, show, warn};
 use super::virtual_converters::{CommonReport, ConverterReport, ErrorArgs, bad_error, integers};
 use super::virtual_signal::{DescribedSignal, SignalArgs};
-use super::written::{Mono, begin_recording, check_outputs, write_together};
+use super::written::{Mono, begin_recording, check_together, write_together};
 use hybank::design::Problem;
 use hybank::io::{Container, PcmFormat, SampleWriter, is_same_rate};
 use hybank::messages::{Quoted, counted};
@@ -230,12 +230,12 @@ impl Args {
         names.map(output).collect()
     }
 
-    /// Refuses outputs that are inputs.
+    /// Refuses outputs that are inputs or must not be replaced.
     fn check_outputs(&self, outputs: &[OutputFile]) -> Result<(), Failure> {
         let files: Vec<_> = outputs.iter().flat_map(|output| SampleWriter::files(&output.path)).collect();
         let files: Vec<_> = files.iter().map(PathBuf::as_path).collect();
         let inputs: Vec<_> = std::iter::once(self.spec.as_path()).chain(self.signal.names()).collect();
-        check_outputs(&files, &inputs)
+        check_together(&files, &inputs, self.force)
     }
 }
 

@@ -19,6 +19,13 @@ pub(super) fn check_output(output: &Path, inputs: &[&Path], force: bool) -> Resu
     if is_dash(output) { Ok(()) } else { files::check_output(output, force).map_err(failed) }
 }
 
+/// As [`check_output`], for files that appear together, in a folder that may not be there yet.
+pub(super) fn check_together(outputs: &[&Path], inputs: &[&Path], force: bool) -> Result<(), Failure> {
+    check_outputs(outputs, inputs)?;
+    let mut there = outputs.iter().filter(|path| !is_dash(path) && path.exists());
+    there.try_for_each(|path| files::check_output(path, force).map_err(failed))
+}
+
 /// Writes a text file that appears when it is whole; `-` is standard output.
 pub(super) fn write_text(path: &Path, text: &str, force: bool) -> Result<(), Failure> {
     write_bytes(path, text.as_bytes(), force)

@@ -1,8 +1,8 @@
 //! Discrete Fourier transforms of any length.
 
 use crate::Complex;
-use realfft::{RealFftPlanner, RealToComplex};
-use rustfft::FftPlanner;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+use rustfft::{Fft, FftPlanner};
 use std::cell::RefCell;
 use std::sync::Arc;
 
@@ -10,30 +10,17 @@ use std::sync::Arc;
 pub fn real_spectrum(samples: &[f64]) -> Vec<Complex<f64>> {
     let mut spectrum = vec![Complex::ZERO; samples.len() / 2 + 1];
     if !samples.is_empty() {
-        let transform = real_transform(samples.len());
         // The lengths fit by construction, which is all that this call can object to.
-        if transform.process(&mut samples.to_vec(), &mut spectrum).is_err() {
+        if real_forward(samples.len()).process(&mut samples.to_vec(), &mut spectrum).is_err() {
             spectrum.fill(Complex::ZERO);
         }
     }
     spectrum
 }
 
-/// The transform of L real samples. Each thread keeps its last one: channels are as long as each other.
-fn real_transform(length: usize) -> Arc<dyn RealToComplex<f64>> {
-    thread_local! {
-        static LAST: RefCell<Option<Arc<dyn RealToComplex<f64>>>> = const { RefCell::new(None) };
-    }
-    LAST.with_borrow_mut(|last| {
-        let kept = last.take().filter(|kept| kept.len() == length);
-        let transform = kept.unwrap_or_else(|| RealFftPlanner::new().plan_fft_forward(length));
-        Arc::clone(last.insert(transform))
-    })
-}
-
 /// X_k = sum_n x_n e^{-2 pi j k n / L} for k = 0 .. L - 1, of L complex samples.
 pub fn spectrum(mut samples: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
-    FftPlanner::new().plan_fft_forward(samples.len()).process(&mut samples);
+    forward(samples.len()).process(&mut samples);
     samples
 }
 
@@ -49,11 +36,8 @@ pub fn real_sequence(spectrum: &[Complex<f64>], length: usize) -> Vec<f64> {
             value.im = 0.0;
         }
     }
-    if length > 0 {
-        let transform = RealFftPlanner::new().plan_fft_inverse(length);
-        if transform.process(&mut spectrum, &mut sequence).is_err() {
-            sequence.fill(0.0);
-        }
+    if length > 0 && real_inverse(length).process(&mut spectrum, &mut sequence).is_err() {
+        sequence.fill(0.0);
     }
     sequence
 }
@@ -76,7 +60,8 @@ pub fn cross_correlation(x: &[f64], y: &[f64]) -> Vec<f64> {
 pub fn half_whitened(x: &[Complex<f64>], r: &[Complex<f64>]) -> Vec<Complex<f64>> {
     let cross = |(x, r): (&Complex<f64>, &Complex<f64>)| {
         let product = x * r.conj();
-        if product.norm() > 0.0 { product / product.norm().sqrt() } else { Complex::ZERO }
+        let modulus = product.norm();
+        if modulus > 0.0 { product / modulus.sqrt() } else { Complex::ZERO }
     };
     x.iter().zip(r).map(cross).collect()
 }
@@ -87,11 +72,55 @@ pub fn half_whitened(x: &[Complex<f64>], r: &[Complex<f64>]) -> Vec<Complex<f64>
 /// If the lengths differ.
 pub fn circular_convolution(mut x: Vec<Complex<f64>>, mut y: Vec<Complex<f64>>) -> Vec<Complex<f64>> {
     assert_eq!(x.len(), y.len(), "a circular convolution needs two sequences of one length");
-    let mut planner = FftPlanner::new();
-    let forward = planner.plan_fft_forward(x.len());
+    let forward = forward(x.len());
     forward.process(&mut x);
     forward.process(&mut y);
     x.iter_mut().zip(&y).for_each(|(x, y)| *x *= y);
-    planner.plan_fft_inverse(x.len()).process(&mut x);
+    inverse(x.len()).process(&mut x);
     x
+}
+
+/// Lengths of which a thread keeps the plans, of each kind: those of a recording, of its pieces and of what
+/// they are compared with.
+const KEPT_PLANS: usize = 4;
+
+/// The plans of the last lengths: the sines and cosines of a plan take longer than a transform.
+struct Plans<P: ?Sized>(Vec<(usize, Arc<P>)>);
+
+impl<P: ?Sized> Plans<P> {
+    const fn none() -> RefCell<Self> {
+        RefCell::new(Self(Vec::new()))
+    }
+
+    /// The plan of a length, made unless it is kept.
+    fn of(&mut self, length: usize, plan: impl FnOnce() -> Arc<P>) -> Arc<P> {
+        let known = self.0.iter().position(|(kept, _)| *kept == length);
+        let found = known.map_or_else(plan, |k| self.0.remove(k).1);
+        self.0.truncate(KEPT_PLANS - 1);
+        self.0.insert(0, (length, Arc::clone(&found)));
+        found
+    }
+}
+
+thread_local! {
+    static FORWARD: RefCell<Plans<dyn Fft<f64>>> = const { Plans::none() };
+    static INVERSE: RefCell<Plans<dyn Fft<f64>>> = const { Plans::none() };
+    static REAL_FORWARD: RefCell<Plans<dyn RealToComplex<f64>>> = const { Plans::none() };
+    static REAL_INVERSE: RefCell<Plans<dyn ComplexToReal<f64>>> = const { Plans::none() };
+}
+
+fn forward(length: usize) -> Arc<dyn Fft<f64>> {
+    FORWARD.with_borrow_mut(|plans| plans.of(length, || FftPlanner::new().plan_fft_forward(length)))
+}
+
+fn inverse(length: usize) -> Arc<dyn Fft<f64>> {
+    INVERSE.with_borrow_mut(|plans| plans.of(length, || FftPlanner::new().plan_fft_inverse(length)))
+}
+
+fn real_forward(length: usize) -> Arc<dyn RealToComplex<f64>> {
+    REAL_FORWARD.with_borrow_mut(|plans| plans.of(length, || RealFftPlanner::new().plan_fft_forward(length)))
+}
+
+fn real_inverse(length: usize) -> Arc<dyn ComplexToReal<f64>> {
+    REAL_INVERSE.with_borrow_mut(|plans| plans.of(length, || RealFftPlanner::new().plan_fft_inverse(length)))
 }

@@ -75,11 +75,16 @@ fn with<'a>(head: &[&'a str], names: &'a [String], tail: &[&'a str]) -> Vec<&'a 
 
 /// `bank.json` for a spec, without the search for its proof.
 pub(crate) fn design(desk: &Desk, spec: &str) {
-    let text = String::from_utf8(desk.read(spec)).unwrap();
-    let bank =
-        hybank::design::design(&Spec::from_toml(&text, spec).unwrap(), &DesignOptions::without_proof())
-            .unwrap()
-            .bank;
+    write_bank(desk, &read_spec(desk, spec));
+}
+
+pub(crate) fn read_spec(desk: &Desk, name: &str) -> Spec {
+    Spec::from_toml(&String::from_utf8(desk.read(name)).unwrap(), name).unwrap()
+}
+
+/// The bank of a spec, without a proof, as `bank.json`.
+pub(crate) fn write_bank(desk: &Desk, spec: &Spec) {
+    let bank = hybank::design::design(spec, &DesignOptions::without_proof()).unwrap().bank;
     desk.write("bank.json", bank.to_json().unwrap());
 }
 

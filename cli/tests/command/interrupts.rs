@@ -26,7 +26,7 @@ fn a_signal_ends_a_simulation_and_leaves_no_file() {
         let desk = Desk::with_spec(THESIS);
         let tones: Vec<String> = (1..90).map(|k| format!("{}", f64::from(k) * 0.005)).collect();
         let source = format!("tones:{}", tones.join(","));
-        let args = ["simulate", "spec.toml", "--source", &source, "--samples", "2000000", "-o", "captures"];
+        let args = ["simulate", "spec.toml", "--source", &source, "--samples", "250000", "-o", "captures"];
         let child = desk.spawn(&args);
         let captures = desk.path("captures");
         until(|| captures.exists() && names(&captures).iter().any(|name| name.ends_with(".part")));
@@ -37,7 +37,7 @@ fn a_signal_ends_a_simulation_and_leaves_no_file() {
 
 /// A design that takes seconds, as soon as it has begun.
 fn design() -> (Desk, Child) {
-    let long = THESIS.replace("taps = 22", "taps = 400").replace("latency = 10", "latency = 180");
+    let long = THESIS.replace("taps = 22", "taps = 240").replace("latency = 10", "latency = 108");
     let desk = Desk::with_spec(&long);
     let child = desk.spawn(&["design", "spec.toml", "-o", "bank.json", "--force"]);
     until_a_thread_begins(child.id(), "progress");

@@ -1,6 +1,6 @@
 //! Memory does not grow with the recording: sparse files through fuse and stream, into a pipe.
 //!
-//! The ordinary suite takes 192 MiB. With HYBANK_SLOW=1 it is 10 GiB, which takes a minute and no
+//! The ordinary suite takes 72 MiB. With HYBANK_SLOW=1 it is 10 GiB, which takes a minute and no
 //! disk.
 
 use crate::support::Desk;
@@ -12,7 +12,7 @@ use std::process::Child;
 const MOST_RESIDENT: u64 = 64 << 10;
 
 fn recording_bytes() -> u64 {
-    if trials::is_slow("recordings of 10 GiB") { 10 << 30 } else { 192 << 20 }
+    if trials::is_slow("recordings of 10 GiB") { 10 << 30 } else { 72 << 20 }
 }
 
 /// A file of `bytes` zeros after `header`, which takes no room on the disk.

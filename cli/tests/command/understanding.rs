@@ -28,16 +28,17 @@ fn designed(desk: &Desk, spec: &str, flags: &[&str]) -> (Option<i32>, String) {
 /// Each of these once gave exit code 0 and a proud report.
 #[test]
 fn slips_are_warned_of_and_refused_with_strict() {
-    let desk = Desk::with_spec(AUDIO);
+    let audio = AUDIO.replace("latency = 12", "latency = 6").replace("taps = 24", "taps = 12");
+    let desk = Desk::with_spec(&audio);
     let thesis = "{ num = [0.25], den = [1.0, 1.0, 0.25] }";
     let family = "{ family = \"butterworth\", order = 4, cutoff = 9000.0 }";
     for (spec, part) in [
-        (AUDIO.replace("9000.0", "9.0"), "write the unit, as in cutoff = \"9 kHz\""),
-        (AUDIO.replace("9000.0", "9e6"), "above the output's Nyquist frequency 24 kHz"),
-        (AUDIO.replace(family, thesis), "look normalised to one sample"),
-        (AUDIO.replace("= 25e-6", "= 12.501e-6"), "channels 1 and 2 sample 4.8e-5 fast periods apart"),
-        (AUDIO.replace("= 25e-6", "= 250e-6"), "more than the ratio 2"),
-        (AUDIO.replace("= 25e-6", "= 12.6e-6"), "noise gain"),
+        (audio.replace("9000.0", "9.0"), "write the unit, as in cutoff = \"9 kHz\""),
+        (audio.replace("9000.0", "9e6"), "above the output's Nyquist frequency 24 kHz"),
+        (audio.replace(family, thesis), "look normalised to one sample"),
+        (audio.replace("= 25e-6", "= 12.501e-6"), "channels 1 and 2 sample 4.8e-5 fast periods apart"),
+        (audio.replace("= 25e-6", "= 250e-6"), "more than the ratio 2"),
+        (audio.replace("= 25e-6", "= 12.6e-6"), "noise gain"),
     ] {
         let (code, message) = designed(&desk, &spec, &[]);
         assert!(code == Some(0) && message.contains(part), "{part}: {code:?} {message}");
@@ -46,7 +47,7 @@ fn slips_are_warned_of_and_refused_with_strict() {
         assert!(code == Some(1) && message.contains("--strict"), "{part}: {code:?} {message}");
         assert!(desk.read("b.json") == before, "{part}");
     }
-    assert_eq!(designed(&desk, AUDIO, &["--strict"]), (Some(0), String::new()));
+    assert_eq!(designed(&desk, &audio, &["--strict"]), (Some(0), String::new()));
 }
 
 #[test]
@@ -66,12 +67,16 @@ fn gamma_has_a_scale_and_the_spec_is_echoed() {
 #[test]
 fn every_spec_to_begin_with_is_designed_as_it_is() {
     let desk = Desk::with_spec(AUDIO);
+    let is_all = trials::is_slow("proven designs of all specs to begin with");
     for example in ["ti-adc", "audio-2x", "sensor-array", "oversampled", "thesis"] {
         desk.good(&["init", "--example", example, "-o", "new.toml", "--force"]);
         let text = String::from_utf8(desk.read("new.toml")).unwrap();
         assert!(text.starts_with('#') && text.contains("[[channel]]"), "{example}: {text}");
         assert_eq!(desk.good(&["init", "--example", example]), text);
-        desk.good(&["design", "new.toml", "-o", "new.json", "--force", "--strict"]);
+        // They are those of filters/, whose designs are tested without proofs.
+        if is_all || example == "audio-2x" {
+            desk.good(&["design", "new.toml", "-o", "new.json", "--force", "--strict"]);
+        }
     }
     desk.refused(1, &["init", "-o", "new.toml"], &["new.toml", "exists", "--force"]);
     desk.refused(2, &["init", "--example", "adc"], &["ti-adc"]);

@@ -145,18 +145,15 @@ fn every_mutation_of_a_bank_file_is_refused() {
     while refused < count {
         let (name, text, value) = &files[dice.below(files.len())];
         let mutation = mutated(text, &mut dice);
-        match accepted(&mutation) {
-            Err(error) => {
-                assert!(error.len() > 10, "{error}");
-                refused += usize::from(!says_the_same(value, &mutation));
-            }
-            Ok(()) => {
-                assert!(says_the_same(value, &mutation), "{name}: a mutation passed:\n{mutation}");
-                unchanged += 1;
-            }
+        if says_the_same(value, &mutation) {
+            unchanged += 1;
+            continue;
         }
+        let error = accepted(&mutation).expect_err(&format!("{name}: a mutation passed:\n{mutation}"));
+        assert!(error.len() > 10, "{error}");
+        refused += 1;
     }
-    println!("{refused} mutations refused, {unchanged} changes that change nothing passed");
+    println!("{refused} mutations refused, {unchanged} changes change nothing");
 }
 
 /// A bank without digest and proof is proven afresh, to the same ends.

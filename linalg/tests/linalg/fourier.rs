@@ -8,7 +8,8 @@ fn sequence(length: usize, seed: f64) -> Vec<Complex<f64>> {
 
 #[test]
 fn spectra_are_the_sums_of_the_definition() {
-    for length in [1, 2, 7, 30] {
+    // More lengths than plans are kept, and some of them again.
+    for length in [1, 2, 7, 30, 31, 32, 2, 32] {
         let samples: Vec<f64> = sequence(length, 0.4).iter().map(|x| x.re).collect();
         for (k, bin) in real_spectrum(&samples).iter().enumerate() {
             let turn = |n: usize| Complex::from_polar(1.0, -TAU * ((k * n) % length) as f64 / length as f64);
@@ -21,7 +22,7 @@ fn spectra_are_the_sums_of_the_definition() {
 
 #[test]
 fn convolutions_are_the_sums_of_the_definition() {
-    for length in [1, 2, 7, 32] {
+    for length in [1, 2, 7, 32, 33, 34, 2, 34] {
         let (x, y) = (sequence(length, 0.3), sequence(length, 1.7));
         let z = circular_convolution(x.clone(), y.clone());
         for (n, z) in z.iter().enumerate() {
