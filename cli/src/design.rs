@@ -3,22 +3,20 @@
 use super::bank_file::{bad_flag, load_spec};
 use super::design_report::{DesignReport, JudgedBank};
 use super::design_studies::BandHint;
+use super::design_watch::DesignWatch;
 use super::interrupt::interrupts;
 use super::print::{
-    Failure, InFile, PROGRAM, check_json, check_strict, failed, failed_at, is_dash, say, say_line,
-    say_understood, show, warn,
+    Failure, InFile, PROGRAM, check_json, check_strict, failed, failed_at, is_dash, say, say_understood,
+    show, warn,
 };
+use super::proof_search::{ProofLimit, Searched, proved};
 use super::written::{check_output, write_text};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
-use hybank::design::{self, Design, DesignError, DesignOptions, Stage, Stop, TIME_LIMIT};
+use hybank::design::{self, Design, DesignError, DesignOptions, Stop, TIME_LIMIT};
 use hybank::messages::Quoted;
 use hybank::spec::{DesignOverrides, Method, Spec, WordLengths};
-use indicatif::{ProgressBar, ProgressStyle};
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
-use std::thread;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// A design is ended between two steps of its searches; so much later it is given up.
@@ -30,7 +28,9 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// from the signal's source w to the error; without [signal] w is the analog input. Four values of gamma are
 /// stated, in normalised time: the computed norm of this bank, an upper bound of its true norm, and computed
 /// lower bounds for all banks of that method and size (lower) and for all banks of any latency (noncausal).
-/// If a proof of the upper bound was found, the file holds it too, for `hybank verify`.
+/// The file is written as soon as the bank is finished. Then a proof of the upper bound is searched, for as
+/// long as the design took, and for three seconds at least. If one is found, it joins the file, for `hybank
+/// verify`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -89,6 +89,12 @@ pub(super) struct Args {
     /// best bank so far
     #[arg(long)]
     no_limit: bool,
+    /// Search for the proof until it is found or there is none, however long that takes
+    #[arg(long, conflicts_with = "no_proof")]
+    prove: bool,
+    /// Do not search for a proof
+    #[arg(long)]
+    no_proof: bool,
     /// Make every warning about the spec and the bank an error
     #[arg(long)]
     strict: bool,
@@ -153,7 +159,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     warn_or_refuse(&spec_warnings(&spec, &args.spec), args.strict)?;
     let begin = Instant::now();
     let found = designed(args, &spec)?;
-    let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
+    let time = begin.elapsed();
     let mut judged = JudgedBank::new(&found.bank).in_file(&args.spec)?;
     if !args.force {
         judged.check_useful(&found.bank).in_file(&args.spec)?;
@@ -162,16 +168,36 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let ended = is_ended.then(|| format!("{}: {}", Quoted(&args.spec), DesignError::Stopped));
     let warnings: Vec<String> = judged.warnings(&found.bank).into_iter().chain(ended).collect();
     warn_or_refuse(&warnings, args.strict)?;
-    write_text(&args.output, &found.bank.to_json().map_err(failed)?, args.force)?;
+    let found = written(args, found, time)?;
     if !is_ended {
-        judged.hint = BandHint::new(&found, seconds).in_file(&args.spec)?;
+        judged.hint = BandHint::new(&found.design, time.as_secs_f64()).in_file(&args.spec)?;
     }
-    let report = DesignReport::new(args.output.display().to_string(), &found, judged, seconds);
+    let report = DesignReport::new(args.output.display().to_string(), &found, judged, time.as_secs_f64());
     if is_dash(&args.output) {
         say(&report.text(args.verbose));
         return Ok(());
     }
     show(&report, args.json, |report| report.text(args.verbose))
+}
+
+/// Writes the bank, and once more if the search for its proof changes it, so that an interrupt loses no bank;
+/// standard output gets it once.
+fn written(args: &Args, design: Design, time: Duration) -> Result<Searched, Failure> {
+    let text = |design: &Design| design.bank.to_json().map_err(failed);
+    let (finished, once) = (text(&design)?, is_dash(&args.output));
+    if !once {
+        write_text(&args.output, &finished, args.force)?;
+    }
+    let limit = match design.proof {
+        Err(DesignError::Stopped) => ProofLimit::Ended,
+        _ => ProofLimit::new(args.prove, args.no_proof, time),
+    };
+    let found = proved(design, limit)?;
+    let searched = text(&found.design)?;
+    if once || searched != finished {
+        write_text(&args.output, &searched, true)?;
+    }
+    Ok(found)
 }
 
 /// The design of a spec. Its time limit and the first interrupt end it with what it has.
@@ -180,13 +206,14 @@ fn designed(args: &Args, spec: &Spec) -> Result<Design, Failure> {
     let watch = DesignWatch {
         stop: Stop::default(),
         interrupts: interrupts(),
+        farewell: "interrupted: the design ends with the best bank so far",
         limit: time_limit.map(|limit| limit + PATIENCE),
         give_up: &|| give_up(&args.spec, spec),
         stage: Mutex::default(),
     };
     let observer = |stage| watch.note(stage);
     let stop = watch.stop.clone();
-    let options = DesignOptions { time_limit, observer: &observer, stop, ..DesignOptions::default() };
+    let options = DesignOptions { time_limit, observer: &observer, stop, ..DesignOptions::without_proof() };
     watch.during(|| design::design(spec, &options)).in_file(&args.spec)
 }
 
@@ -207,129 +234,4 @@ fn warn_or_refuse(warnings: &[String], strict: bool) -> Result<(), Failure> {
     check_strict(warnings, strict)?;
     warnings.iter().for_each(|warning| warn(warning));
     Ok(())
-}
-
-/// Shorter designs say nothing on a terminal.
-const SILENCE: Duration = Duration::from_secs(1);
-/// Time between two looks at a design that runs.
-const LOOK: Duration = Duration::from_millis(125);
-/// Time between two lines where stderr is no terminal.
-const LINE: Duration = Duration::from_secs(30);
-
-/// Follows a design: shows what it does, ends it at an interrupt, and gives it up long after its limit.
-struct DesignWatch<'a> {
-    stop: Stop,
-    interrupts: Receiver<()>,
-    limit: Option<Duration>,
-    give_up: &'a (dyn Fn() + Sync),
-    /// What the design does now.
-    stage: Mutex<Option<Stage>>,
-}
-
-impl DesignWatch<'_> {
-    /// The step that begins.
-    fn note(&self, stage: Stage) {
-        *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = Some(stage);
-    }
-
-    /// Runs `work` and follows it meanwhile. Without a thread for that, nothing is shown and nothing
-    /// limited.
-    fn during<T>(&self, work: impl FnOnce() -> T) -> T {
-        thread::scope(|scope| {
-            let (done_sender, done): (Sender<()>, _) = bounded(0);
-            // A thread that cannot be started is no reason to fail.
-            let follower = thread::Builder::new().name("progress".into());
-            let follower = follower.spawn_scoped(scope, move || self.follow(&done));
-            let result = work();
-            drop((done_sender, follower));
-            result
-        })
-    }
-
-    fn follow(&self, done: &Receiver<()>) {
-        let (begin, is_terminal) = (Instant::now(), std::io::stderr().is_terminal());
-        let mut due = if is_terminal { SILENCE } else { LINE };
-        let bar = ProgressBar::new_spinner();
-        let bar = ProgressStyle::with_template("{spinner} {msg}")
-            .map_or(bar.clone(), |style| bar.with_style(style));
-        while done.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
-            let elapsed = begin.elapsed();
-            if self.interrupts.try_recv().is_ok() {
-                bar.suspend(|| say_line("interrupted: the design ends with the best bank so far"));
-                self.stop.now();
-            }
-            if self.limit.is_some_and(|limit| elapsed > limit) {
-                (self.give_up)();
-            }
-            match self.text(elapsed).filter(|_| elapsed >= due) {
-                Some(line) if is_terminal => {
-                    bar.set_message(line);
-                    bar.tick();
-                }
-                Some(line) => {
-                    say_line(&line);
-                    due += LINE;
-                }
-                None => {}
-            }
-        }
-        bar.finish_and_clear();
-    }
-
-    fn text(&self, elapsed: Duration) -> Option<String> {
-        let stage = (*self.stage.lock().unwrap_or_else(PoisonError::into_inner))?;
-        Some(format!("{stage}: {} s", elapsed.as_secs()))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn watch<'a>(limit: Option<Duration>, give_up: &'a (dyn Fn() + Sync)) -> DesignWatch<'a> {
-        DesignWatch {
-            stop: Stop::default(),
-            interrupts: crossbeam_channel::never(),
-            limit,
-            give_up,
-            stage: Mutex::default(),
-        }
-    }
-
-    #[test]
-    fn the_line_says_the_step_and_its_time_so_far() {
-        let watch = watch(None, &|| ());
-        assert_eq!(watch.text(Duration::from_secs(31)), None);
-        watch.note(Stage::Latency { designs: 7 });
-        let line = watch.text(Duration::from_secs(31)).unwrap();
-        assert_eq!(line, "choosing the latency (7 designs compared): 31 s");
-    }
-
-    #[test]
-    fn the_result_of_the_work_comes_back() {
-        assert_eq!(watch(None, &|| ()).during(|| 7), 7);
-    }
-
-    #[test]
-    fn work_that_does_not_end_in_time_is_given_up() {
-        let (given_up, done) = bounded(1);
-        let give_up = || _ = given_up.try_send(());
-        let waited = watch(Some(Duration::ZERO), &give_up).during(|| done.recv_timeout(PATIENCE));
-        assert_eq!(waited, Ok(()));
-        watch(Some(PATIENCE), &|| panic!("in time")).during(|| ());
-    }
-
-    #[test]
-    fn an_interrupt_stops_the_design() {
-        let (interrupt, interrupts) = bounded(1);
-        let watch = DesignWatch { interrupts, ..watch(None, &|| ()) };
-        let begin = Instant::now();
-        watch.during(|| {
-            interrupt.send(()).unwrap();
-            while !watch.stop.is_due() && begin.elapsed() < PATIENCE {
-                thread::yield_now();
-            }
-        });
-        assert!(watch.stop.is_due());
-    }
 }

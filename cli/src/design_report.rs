@@ -1,9 +1,10 @@
 //! The report of `hybank design` and `hybank import` on a finished bank, as text and as JSON.
 
 use super::design_studies::{BandHint, WordReport, known, number, order_text, robust_text};
+use super::proof_search::{SearchCut, Searched};
 use hybank::bank::{Bank, Gamma, SynthesisFilters};
 use hybank::design::{
-    Design, DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, Study, analyze_mean,
+    DesignError, GammaScale, MeanAnalysis, OrderReduction, RobustStudy, Study, analyze_mean,
 };
 use hybank::figures::Figures;
 use hybank::messages::{Quoted, counted};
@@ -90,6 +91,9 @@ struct ProofReport {
     /// Why there is no proof in the file.
     #[serde(skip_serializing_if = "Option::is_none")]
     unproven: Option<String>,
+    /// Why the search was cut, if it was.
+    #[serde(skip)]
+    cut: Option<SearchCut>,
     /// Why the proof does not cover the errors of the spec's `[uncertainty]`.
     #[serde(skip_serializing_if = "Option::is_none")]
     box_unproven: Option<String>,
@@ -98,11 +102,14 @@ struct ProofReport {
 }
 
 impl ProofReport {
-    fn of(design: &Design) -> Self {
+    fn of(Searched { design, cut }: &Searched) -> Self {
+        let gamma = |reason: &DesignError| cut.map_or_else(|| reason.to_string(), SearchCut::of_gamma);
+        let of_box = |reason: &DesignError| cut.map_or_else(|| reason.to_string(), SearchCut::of_box);
         Self {
             proven: design.proof.as_ref().ok().copied(),
-            unproven: design.proof.as_ref().err().map(ToString::to_string),
-            box_unproven: design.box_unproven.as_ref().map(ToString::to_string),
+            unproven: design.proof.as_ref().err().map(gamma),
+            cut: *cut,
+            box_unproven: design.box_unproven.as_ref().map(of_box),
             seconds: design.proof_time.as_secs_f64(),
         }
     }
@@ -127,7 +134,8 @@ impl ProofReport {
 
 impl<'a> DesignReport<'a> {
     /// Of a bank written to `output`, designed in so many seconds.
-    pub(super) fn new(output: String, design: &'a Design, judged: JudgedBank, seconds: f64) -> Self {
+    pub(super) fn new(output: String, found: &'a Searched, judged: JudgedBank, seconds: f64) -> Self {
+        let design = &found.design;
         let bank = &design.bank;
         let (reduction, robust) = match &design.study {
             Study::Fir { robust, .. } => (None, robust.as_ref()),
@@ -156,7 +164,7 @@ impl<'a> DesignReport<'a> {
             peak_hertz: design.peak_frequency.in_hertz(bank.slow_period()),
             is_normalised: bank.is_normalised(),
             seconds,
-            proof: ProofReport::of(design),
+            proof: ProofReport::of(found),
         }
     }
 
@@ -211,10 +219,10 @@ impl DesignReport<'_> {
 
     /// The worst case in one line, proven or not.
     fn gamma_line(&self) -> String {
-        let proof = match (&self.proof.proven, &self.proof.unproven) {
+        let proof = match (&self.proof.proven, self.proof.cut) {
             (Some(proven), _) => format!("proven: at most {}", number(proven.upper)),
-            (_, Some(_)) => "computed, not proven; --verbose says why".to_owned(),
-            _ => "computed".to_owned(),
+            (None, Some(cut)) => format!("computed, {}", cut.of_gamma()),
+            (None, None) => "computed, not proven; --verbose says why".to_owned(),
         };
         let input =
             if self.judged.figures.any_input.is_some() { "the signal's source w" } else { "the input" };

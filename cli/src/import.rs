@@ -3,6 +3,7 @@
 use super::bank_file::load_spec_or_bank;
 use super::design_report::{DesignReport, JudgedBank};
 use super::print::{Failure, InFile, failed, failed_at, show, warn};
+use super::proof_search::Searched;
 use super::written::{check_output, write_text};
 use hybank::design::{self, ProofSearch};
 use hybank::files::{Bound, read_bytes};
@@ -62,6 +63,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     judged.warnings(&found.bank).iter().for_each(|warning| warn(warning));
     write_text(&args.output, &found.bank.to_json().map_err(failed)?, args.force)?;
     let seconds = (begin.elapsed() - found.proof_time).as_secs_f64();
+    let found = Searched { design: found, cut: None };
     let report = DesignReport::new(args.output.display().to_string(), &found, judged, seconds);
     show(&report, args.json, |report| report.text(args.verbose))
 }

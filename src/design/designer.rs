@@ -139,7 +139,9 @@ fn designed(spec: &Spec, options: &DesignOptions<'_>) -> Result<Design, DesignEr
     if stop.is_due() {
         return Ok(Design { proof: Err(DesignError::Stopped), ..judged });
     }
-    (options.observer)(Stage::Proof);
+    if options.proof == ProofSearch::Run {
+        (options.observer)(Stage::Proof);
+    }
     Ok(judged.proved(options.proof, &stop))
 }
 
@@ -210,18 +212,30 @@ impl Design {
         self
     }
 
-    /// Adds the proof to the bank, if `search` asks for one and it is found.
+    /// Searches for the proof, if `search` asks for one.
     fn proved(mut self, search: ProofSearch, stop: &Stop) -> Self {
         if search == ProofSearch::Run {
-            let begin = Instant::now();
-            self.proof = prove::attach_proof(&mut self.bank, stop);
-            // `verify` proves the worst case only with the rest.
-            if self.proof.is_ok() && matches!(self.study, Study::Fir { robust: Some(_), .. }) {
-                self.box_unproven = prove::attach_box_proof(&mut self.bank, stop).err();
-            }
-            self.proof_time = begin.elapsed();
+            self.prove(stop, &|_| ());
         }
         self
+    }
+
+    /// Searches for the proof of gamma, and then for that of the worst case over the box of the spec's
+    /// `[uncertainty]` where the bank was designed for it. Each joins the bank if it is found. After each
+    /// search `observer` is called with what is proven so far.
+    pub fn prove(&mut self, stop: &Stop, observer: &dyn Fn(&Self)) {
+        let begin = Instant::now();
+        self.proof = prove::attach_proof(&mut self.bank, stop);
+        // `verify` proves the worst case only with the rest.
+        let has_box = self.proof.is_ok() && matches!(self.study, Study::Fir { robust: Some(_), .. });
+        self.box_unproven = has_box.then_some(DesignError::ProofSkipped);
+        self.proof_time = begin.elapsed();
+        observer(self);
+        if has_box {
+            self.box_unproven = prove::attach_box_proof(&mut self.bank, stop).err();
+            self.proof_time = begin.elapsed();
+            observer(self);
+        }
     }
 }
 

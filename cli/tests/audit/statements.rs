@@ -35,7 +35,7 @@ pub(crate) enum Outcome {
 /// Designs `spec` and reads the file that was written.
 pub(crate) fn designed(desk: &Desk, spec: &Value) -> Outcome {
     desk.write("spec.toml", toml::to_string(spec).expect("a spec"));
-    let output = desk.run(&["design", "spec.toml", "-o", "bank.json", "--json", "--force"], &[]);
+    let output = desk.run(&["design", "--prove", "spec.toml", "-o", "bank.json", "--json", "--force"], &[]);
     if !output.status.success() {
         return Outcome::Refused(String::from_utf8_lossy(&output.stderr).into_owned());
     }

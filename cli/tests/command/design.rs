@@ -11,7 +11,7 @@ use serde_json::Value;
 #[test]
 fn a_design_is_reported_and_analysed() {
     let desk = Desk::with_spec(THESIS);
-    let out = desk.good(&["design", "spec.toml", "-o", "bank.json"]);
+    let out = desk.good(&["design", "--prove", "spec.toml", "-o", "bank.json"]);
     let names: Vec<&str> = out.lines().map(|line| line.split("  ").next().unwrap_or_default()).collect();
     let heading = "bank.json: fir, 2 channels, ratio 2, 22 taps per channel, latency 10";
     assert_eq!(names[..2], [heading, "SNR"], "{out}");
@@ -22,7 +22,7 @@ fn a_design_is_reported_and_analysed() {
             && out.contains("\ngamma      0.039932"),
         "{out}"
     );
-    let all = desk.good(&["design", "spec.toml", "-o", "bank.json", "--force", "--verbose"]);
+    let all = desk.good(&["design", "--prove", "spec.toml", "-o", "bank.json", "--force", "--verbose"]);
     assert!(all.lines().count() > 11 && all.contains("\nnoncausal  "), "{all}");
     let bank = desk.read_json("bank.json");
     assert_eq!(bank["format"], "hybank-bank");
@@ -75,6 +75,20 @@ fn figures_in_the_terms_of_the_user_are_reported() {
         "{out}"
     );
     assert!(out.lines().count() == 6 && out.contains("uncertain delays"), "{out}");
+}
+
+#[test]
+fn a_bank_without_its_proof_is_the_same_bank() {
+    let desk = Desk::with_spec(THESIS);
+    desk.good(&["design", "--prove", "spec.toml", "-o", "proven.json"]);
+    let out = desk.good(&["design", "--no-proof", "spec.toml", "-o", "bank.json"]);
+    assert!(out.contains("computed, not proven, as asked"), "{out}");
+    let (bank, proven) = (desk.read_json("bank.json"), desk.read_json("proven.json"));
+    assert!(bank["proof"].is_null() && proven["proof"].is_object());
+    for key in ["channels", "latency", "method", "spec"] {
+        assert_eq!(bank[key], proven[key], "{key}");
+    }
+    desk.refused(2, &["design", "spec.toml", "-o", "no.json", "--prove", "--no-proof"], &["--no-proof"]);
 }
 
 #[test]

@@ -67,3 +67,20 @@ fn a_design_ends_at_the_second_signal_without_a_file() {
     assert_eq!(child.wait().unwrap().code(), Some(128 + 2));
     assert_eq!(names(&desk.path("")), ["spec.toml"]);
 }
+
+/// The bank has its name before the search for its proof begins.
+#[test]
+fn a_search_for_a_proof_ends_at_the_first_signal_and_leaves_the_bank() {
+    let filters = concat!(env!("CARGO_MANIFEST_DIR"), "/../filters/interleaved-4x250M.toml");
+    let desk = Desk::with_spec(&std::fs::read_to_string(filters).unwrap());
+    let child = desk.spawn(&["design", "spec.toml", "-o", "bank.json", "--prove"]);
+    until_a_thread_begins(child.id(), "proof");
+    send(child.id(), TERM);
+    let Output { status, stdout, stderr, .. } = child.wait_with_output().unwrap();
+    let said = text(&stderr);
+    assert_eq!(status.code(), Some(0), "{said}");
+    assert!(said.contains("interrupted: the search for the proof ends"), "{said}");
+    assert!(text(&stdout).contains("not proven, the search was interrupted"), "{stdout:?}");
+    let bank = desk.read_json("bank.json");
+    assert!(bank["gamma"]["norm"].is_number() && bank["proof"].is_null(), "{}", bank["gamma"]);
+}

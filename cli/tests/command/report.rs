@@ -8,7 +8,7 @@ const LOADING: [&str; 6] = ["<script", "<img", "<iframe", "src=", "@import", "ur
 fn desk() -> Desk {
     let desk =
         Desk::with_spec(&THESIS.replace("fast_period = 1.0", "name = \"a < b & c\"\nfast_period = 1.0"));
-    desk.good(&["design", "spec.toml", "-o", "b.json"]);
+    desk.good(&["design", "--prove", "spec.toml", "-o", "b.json"]);
     desk
 }
 

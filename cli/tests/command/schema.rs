@@ -62,7 +62,7 @@ fn banks_fit_their_schema() {
     let mut banks: Vec<Value> =
         examples("json").iter().map(|(_, text)| serde_json::from_str(text).unwrap()).collect();
     for flags in [&["--bits", "8"][..], &["--method", "iir"]] {
-        desk.good(&[&["design", "spec.toml", "-o", "b.json", "--force"], flags].concat());
+        desk.good(&[&["design", "--prove", "spec.toml", "-o", "b.json", "--force"], flags].concat());
         banks.push(desk.read_json("b.json"));
     }
     for bank in &banks {

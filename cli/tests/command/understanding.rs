@@ -144,13 +144,13 @@ fn bode(cutoff: f64, delay: f64) -> String {
 #[test]
 fn a_measured_front_end_is_modelled() {
     let desk = Desk::with_spec(AUDIO);
-    let exact = desk.report(&["design", "spec.toml", "-o", "exact.json"]);
+    let exact = desk.report(&["design", "--prove", "spec.toml", "-o", "exact.json"]);
     std::fs::create_dir(desk.path("sub")).unwrap();
     desk.write("sub/bode.csv", bode(9000.0, 0.0));
     let family = "{ family = \"butterworth\", order = 4, cutoff = 9000.0 }";
     let measured = AUDIO.replace(family, "{ response = \"bode.csv\", order = 4 }");
     desk.write("sub/spec.toml", &measured);
-    let output = desk.run(&["design", "sub/spec.toml", "-o", "b.json"], &[]);
+    let output = desk.run(&["design", "--prove", "sub/spec.toml", "-o", "b.json"], &[]);
     let echo = text(&output.stderr);
     assert!(
         output.status.success() && echo.contains("bode.csv: 4 poles fitted to 120 frequencies"),

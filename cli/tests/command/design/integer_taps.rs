@@ -6,7 +6,7 @@ use serde_json::Value;
 #[test]
 fn integer_taps_are_designed_proven_and_run() {
     let desk = Desk::with_spec(THESIS);
-    let report = desk.json(&["design", "spec.toml", "-o", "bank.json", "--bits", "6", "--json"]);
+    let report = desk.json(&["design", "--prove", "spec.toml", "-o", "bank.json", "--bits", "6", "--json"]);
     let bank = desk.read_json("bank.json");
     let step = (-number(&report, "/words/fraction_bits")).exp2();
     for (channel, integers) in
@@ -36,7 +36,7 @@ fn integer_taps_are_designed_proven_and_run() {
     desk.good(&["design", "spec.toml", "-o", "list.json", "--bits", &list, "--fraction-bits", "8"]);
     let toml = THESIS.replace("taps = 22", "taps = 22\nbits = 10\nfraction_bits = 9");
     desk.write("fixed.toml", toml);
-    let report = desk.json(&["design", "fixed.toml", "-o", "fixed.json", "--json"]);
+    let report = desk.json(&["design", "--prove", "fixed.toml", "-o", "fixed.json", "--json"]);
     assert_eq!(number(&report, "/words/fraction_bits"), 9.0);
     desk.good(&["verify", "fixed.json"]);
     // Another method has no use for them.
@@ -61,7 +61,7 @@ fn interleaving_without_any_error_loses_nothing_and_leaves_nothing_open() {
                 target = { filter = { family = \"butterworth\", order = 2, cutoff = 0.1 } }\n\
                 design = { method = \"fir\", taps = 8 }\n";
     let desk = Desk::with_spec(text);
-    let report = desk.json(&["design", "spec.toml", "-o", "b.json", "--loss-db", "0.1", "--json"]);
+    let report = desk.json(&["design", "--prove", "spec.toml", "-o", "b.json", "--loss-db", "0.1", "--json"]);
     assert_eq!(number(&report, "/words/choice/snr_loss_db"), 0.0);
     assert!(desk.read_json("b.json")["proof"].is_object(), "{report}");
 }
@@ -81,7 +81,9 @@ fn bits_are_chosen_for_a_loss() {
     let desk = Desk::with_spec(TWELVE_BITS);
     let design = |name: &str, flags: &str| {
         let words: Vec<&str> = flags.split_whitespace().collect();
-        desk.json(&[&["design", "spec.toml", "-o", name, "--json", "--force"][..], &words].concat())
+        desk.json(
+            &[&["design", "--prove", "spec.toml", "-o", name, "--json", "--force"][..], &words].concat(),
+        )
     };
     let real = design("real.json", "");
     let losses =

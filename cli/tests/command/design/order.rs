@@ -9,7 +9,7 @@ fn the_order_is_reduced_reported_and_proven() {
         .replace("latency = 10", "latency = 4")
         .replace("method = \"fir\"\ntaps = 22", "method = \"iir\"");
     desk.write("iir.toml", &iir);
-    let report = desk.json(&["design", "iir.toml", "-o", "two.json", "--order", "2", "--json"]);
+    let report = desk.json(&["design", "--prove", "iir.toml", "-o", "two.json", "--order", "2", "--json"]);
     assert_eq!((&report["states"], &report["reduction"]["reduced"]["order"]), (&2.into(), &2.into()));
     let (full, order) =
         (number(&report, "/reduction/full/order"), number(&report, "/reduction/reduced/order"));
