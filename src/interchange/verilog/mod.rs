@@ -1,7 +1,8 @@
 //! A bank of integer taps as a module in Verilog-2001, with the bits of [`BitTrue`].
 //!
 //! Words are as wide as their exact ranges, which follow from the taps and the bits of the samples, or as
-//! the accumulator where that is less. Adders of a tree have registers in between.
+//! the accumulator where that is less. Adders of a tree have registers in between. Taps are constants, or words
+//! that a host loads.
 
 mod folded;
 mod load;
