@@ -31,6 +31,8 @@ Examples:
   hybank export fixed.json -o bank.h --input-bits 12
   hybank export fixed.json -o core.v --input-bits 12 --output-bits 14 --testbench test
   hybank export fixed.json -o core.v --input-bits 12 --clocks-per-frame 8 --pipeline 2
+  hybank export fixed.json -o core.v --input-bits 12 --loadable --testbench test
+  hybank export other.json -o other.mem --input-bits 12 --loadable
   hybank export recursive.json --format sos -o sections.csv")]
 pub(super) struct Args {
     /// The bank (JSON); `-` is standard input
@@ -99,6 +101,14 @@ struct VerilogArgs {
     /// Clocks between two frames: with C of them, each multiplier serves C taps [default: 1]
     #[arg(long, value_name = "C")]
     clocks_per_frame: Option<NonZeroU32>,
+    /// Frames that a clock takes: sample x(i + N r) and output y(p + M r) belong to the frame r of the clock
+    /// [default: 1]
+    #[arg(long, value_name = "P")]
+    frames_per_clock: Option<NonZeroU32>,
+    /// Taps and offsets are written through a port, so that one synthesis serves every bank of this size; with
+    /// --format mem the words of such a port
+    #[arg(long)]
+    loadable: bool,
     /// Levels of adders between two registers [default: 1]
     #[arg(long, value_name = "LEVELS")]
     pipeline: Option<NonZeroU32>,
@@ -114,8 +124,8 @@ struct VerilogArgs {
 impl VerilogArgs {
     fn is_given(&self) -> bool {
         let numbers = [self.output_bits, self.accumulator, self.random_frames].iter().any(Option::is_some);
-        let circuit = self.clocks_per_frame.is_some() || self.pipeline.is_some();
-        numbers || circuit || self.testbench.is_some()
+        let circuit = [self.clocks_per_frame, self.frames_per_clock, self.pipeline];
+        numbers || circuit.iter().any(Option::is_some) || self.testbench.is_some() || self.loadable
     }
 
     fn options(&self, input_bits: Option<u32>) -> VerilogOptions {
@@ -125,7 +135,9 @@ impl VerilogArgs {
             output_bits: self.output_bits,
             accumulator_bits: self.accumulator,
             clocks_per_frame: self.clocks_per_frame.unwrap_or(plain.clocks_per_frame),
+            frames_per_clock: self.frames_per_clock.unwrap_or(plain.frames_per_clock),
             pipeline: self.pipeline.unwrap_or(plain.pipeline),
+            is_loadable: self.loadable,
         }
     }
 }
@@ -144,9 +156,10 @@ struct ExportReport {
 
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let format = args.chosen_format()?;
-    if format != Format::Verilog && args.verilog.is_given() {
+    let is_load = format == Format::Mem && args.verilog.loadable && args.verilog.testbench.is_none();
+    if format != Format::Verilog && args.verilog.is_given() && !is_load {
         let message = "these options describe a circuit; give --format verilog, or leave out --output-bits, --accumulator, \
-             --clocks-per-frame, --pipeline and --testbench";
+             --clocks-per-frame, --frames-per-clock, --loadable, --pipeline and --testbench";
         return Err(Failure::Usage(message.to_owned()));
     }
     check_json(args.json, &args.output, "code")?;
@@ -156,7 +169,14 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
         Format::Verilog => Some(write_verilog(args, &bank)?),
         _ => {
             let name = args.name.as_deref().unwrap_or("bank");
-            let mut bytes = export(&bank, format, name, args.input_bits).in_file(&args.bank)?;
+            let mut bytes = match is_load {
+                true => {
+                    let options = args.verilog.options(args.input_bits);
+                    let words = Verilog::new(&bank, name, &options).in_file(&args.bank)?.load;
+                    words.unwrap_or_default().into_bytes()
+                }
+                false => export(&bank, format, name, args.input_bits).in_file(&args.bank)?,
+            };
             if format == Format::Sos {
                 bytes.splice(0..0, gamma_of_sections(&bank).in_file(&args.bank)?.bytes());
             }

@@ -64,8 +64,8 @@ impl Bank {
     #[pyo3(
         signature = (
             path, *, format, name = "bank", input_bits = None, output_bits = None, accumulator = None,
-            clocks_per_frame = None, pipeline = None, testbench = None, random_frames = None,
-            overwrite = true
+            clocks_per_frame = None, frames_per_clock = None, pipeline = None, loadable = false,
+            testbench = None, random_frames = None, overwrite = true
         )
     )]
     #[allow(clippy::too_many_arguments, reason = "keywords of a Python function")]
@@ -78,7 +78,9 @@ impl Bank {
         output_bits: Option<u32>,
         accumulator: Option<u32>,
         clocks_per_frame: Option<u32>,
+        frames_per_clock: Option<u32>,
         pipeline: Option<u32>,
+        loadable: bool,
         testbench: Option<PathBuf>,
         random_frames: Option<u32>,
         overwrite: bool,
@@ -88,13 +90,19 @@ impl Bank {
             output_bits,
             accumulator,
             clocks_per_frame,
+            frames_per_clock,
             pipeline,
+            loadable,
             testbench,
             random_frames,
         };
         if format == Exported::Verilog {
             let circuit = keywords.write(&slf.get().bank, &path, name, input_bits, overwrite)?;
             return record(slf.py(), &circuit).map(Some);
+        }
+        if format == Exported::Mem && loadable && keywords.testbench.is_none() {
+            write_file(&path, keywords.load(&slf.get().bank, input_bits)?.as_bytes(), overwrite)?;
+            return Ok(None);
         }
         keywords.check_none()?;
         let bytes = export(&slf.get().bank, format, name, input_bits).map_err(refused)?;

@@ -20,7 +20,9 @@ pub(crate) struct CircuitKeywords {
     pub(crate) output_bits: Option<u32>,
     pub(crate) accumulator: Option<u32>,
     pub(crate) clocks_per_frame: Option<u32>,
+    pub(crate) frames_per_clock: Option<u32>,
     pub(crate) pipeline: Option<u32>,
+    pub(crate) loadable: bool,
     pub(crate) testbench: Option<PathBuf>,
     pub(crate) random_frames: Option<u32>,
 }
@@ -28,10 +30,12 @@ pub(crate) struct CircuitKeywords {
 impl CircuitKeywords {
     /// Refuses keywords that another format would ignore.
     pub(crate) fn check_none(&self) -> PyResult<()> {
-        let numbers = [self.output_bits, self.accumulator, self.clocks_per_frame, self.pipeline];
-        if numbers.iter().any(Option::is_some) || self.testbench.is_some() || self.random_frames.is_some() {
+        let words = [self.output_bits, self.accumulator, self.random_frames];
+        let clocks = [self.clocks_per_frame, self.frames_per_clock, self.pipeline];
+        let is_any = words.iter().chain(&clocks).any(Option::is_some);
+        if is_any || self.testbench.is_some() || self.loadable {
             return Err(refused(
-                "output_bits, accumulator, clocks_per_frame, pipeline, testbench and random_frames \
+                "output_bits, accumulator, clocks_per_frame, frames_per_clock, pipeline, loadable, testbench and random_frames \
                  describe a circuit; give format=\"verilog\" or leave them out",
             ));
         }
@@ -44,8 +48,16 @@ impl CircuitKeywords {
             output_bits: self.output_bits,
             accumulator_bits: self.accumulator,
             clocks_per_frame: at_least_one("clocks_per_frame", self.clocks_per_frame)?,
+            frames_per_clock: at_least_one("frames_per_clock", self.frames_per_clock)?,
             pipeline: at_least_one("pipeline", self.pipeline)?,
+            is_loadable: self.loadable,
         })
+    }
+
+    /// The words that a loadable module of these keywords takes.
+    pub(crate) fn load(&self, bank: &Bank, input_bits: Option<u32>) -> PyResult<String> {
+        let verilog = Verilog::new(bank, "bank", &self.options(input_bits)?).map_err(refused)?;
+        Ok(verilog.load.unwrap_or_default())
     }
 
     /// Writes the module, and the testbench with it; the files appear together.

@@ -182,10 +182,15 @@ def test_a_circuit_is_that_of_the_command_line(binary, filters, tmp_path):
     assert (tmp_path / "python.v").read_text() == (tmp_path / "command.v").read_text()
     for file in (tmp_path / "c").iterdir():
         assert file.read_bytes() == (tmp_path / "p" / file.name).read_bytes()
+    bench = {"loadable": True, "testbench": tmp_path / "l", "random_frames": 5, **options}
+    fixed.export(tmp_path / "loadable.v", format="verilog", name="core", **bench)
+    fixed.export(tmp_path / "words.mem", format="mem", loadable=True, **options)
+    assert (tmp_path / "words.mem").read_text() == (tmp_path / "l" / "load.mem").read_text()
     printed = json.loads(done.stdout)
     assert {name: printed[name] for name in vars(circuit)} == vars(circuit)
     for keywords, words in [
         ({"format": "c", "pipeline": 2}, "describe a circuit"),
+        ({"format": "coe", "loadable": True}, "describe a circuit"),
         ({"format": "verilog", "random_frames": 5}, "belong to a testbench"),
         ({"format": "verilog", "clocks_per_frame": 0}, "clocks_per_frame: 0"),
         ({"format": "verilog"}, "bits of the samples"),

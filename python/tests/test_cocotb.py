@@ -1,4 +1,4 @@
-"""An exported core in cocotb and Icarus Verilog, frame upon frame or with several clocks for each."""
+"""An exported core in cocotb and Icarus Verilog: a frame per clock, several clocks per frame, several frames per clock."""
 
 import shutil
 import subprocess
@@ -18,8 +18,8 @@ design = { method = "fir", taps = 24, bits = 12 }
 """
 
 
-@pytest.mark.parametrize("clocks", ["1", "4"])
-def test_a_core_has_the_bits_of_the_model(binary, tmp_path, clocks):
+@pytest.mark.parametrize("circuit", [[], ["--clocks-per-frame", "4"], ["--frames-per-clock", "2"]])
+def test_a_core_has_the_bits_of_the_model(binary, tmp_path, circuit):
     pytest.importorskip("cocotb")
     if shutil.which("iverilog") is None:
         pytest.skip("Icarus Verilog is not installed")
@@ -29,7 +29,7 @@ def test_a_core_has_the_bits_of_the_model(binary, tmp_path, clocks):
         return subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
 
     assert run(binary, "design", "spec.toml", "-o", "fixed.json").returncode == 0
-    core = ["-o", "core.v", "--input-bits", "12", "--testbench", "vectors", "--clocks-per-frame", clocks]
+    core = ["-o", "core.v", "--input-bits", "12", "--testbench", "vectors", *circuit]
     assert run(binary, "export", "fixed.json", *core).returncode == 0
     simulate = [sys.executable, ROOT / "examples/fpga/cocotb_core.py", "core.v", "vectors"]
     done = run(*simulate)

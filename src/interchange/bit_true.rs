@@ -228,6 +228,23 @@ impl IntegerFilters {
         filters
     }
 
+    /// The same filters of blocks of frames: a block is one sample of each channel of its first frame, then
+    /// those of the next one. A channel of frame r has its impulse response r M fast samples later.
+    pub(super) fn of_blocks(&self, frames: usize) -> Self {
+        let Self { taps, constants, resting } = self;
+        let (ratio, samples) = (taps.ratio, taps.lags * taps.ratio);
+        let delayed = |r: usize, i: usize| -> Vec<i64> {
+            let own = (0..samples).map(|n| taps.get(i, n % ratio, n / ratio));
+            std::iter::repeat_n(0, r * ratio).chain(own).collect()
+        };
+        let all: Vec<_> = (0..frames).flat_map(|r| (0..taps.channels).map(move |i| delayed(r, i))).collect();
+        Self {
+            taps: PolyphaseTaps::new(&all, ratio * frames),
+            constants: constants.repeat(frames),
+            resting: resting.repeat(frames),
+        }
+    }
+
     /// Whether the samples have offsets.
     pub(super) fn has_offsets(&self) -> bool {
         self.constants.iter().chain(&self.resting).any(|x| *x != 0)

@@ -15,6 +15,19 @@ pub enum ExportError {
         /// Name of the format.
         format: &'static str,
     },
+    /// Frames share a clock, or clocks a frame.
+    #[error(
+        "no circuit has {frames} frames per clock and {clocks} clocks per frame; one of them must be 1, and the frames \
+         {most} at most"
+    )]
+    Clocks {
+        /// Frames per clock.
+        frames: u32,
+        /// Clocks per frame.
+        clocks: u32,
+        /// The most frames per clock.
+        most: u32,
+    },
     /// A testbench of more random frames than a simulator runs.
     #[error("a testbench of {given} random frames is not written; ask for {most} at most")]
     Frames {

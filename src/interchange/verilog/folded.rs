@@ -1,10 +1,12 @@
 //! A frame at every C clocks: filters in direct form. Each multiplier takes C samples of the history one
-//! after another, with their coefficients from a ROM; a tree adds the products of a phase, and an
-//! accumulator adds the clocks.
+//! after another, with their coefficients from a ROM or from words that were loaded; a tree adds the products
+//! of a phase, and an accumulator adds the clocks.
 
+use super::load::LoadPort;
 use super::netlist::{Netlist, ShiftedWord, Word, constant, wrapped};
 use super::output::OutputRounding;
 use crate::interchange::bit_true::{IntegerFilters, Range};
+use crate::interchange::layout::PolyphaseTaps;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -18,8 +20,7 @@ pub(super) struct Schedule {
 
 impl Schedule {
     /// No more clocks than samples.
-    pub(super) fn new(filters: &IntegerFilters, clocks: usize) -> Self {
-        let taps = &filters.taps;
+    pub(super) fn new(taps: &PolyphaseTaps<i64>, clocks: usize) -> Self {
         let all = (0..taps.lags).flat_map(|j| (0..taps.channels).map(move |i| (i, j)));
         let is_used = |&(i, j): &(usize, usize)| (0..taps.ratio).any(|p| taps.get(i, p, j) != 0);
         let samples: Vec<(usize, usize)> = all.filter(is_used).collect();
@@ -27,10 +28,15 @@ impl Schedule {
         Self { samples, clocks }
     }
 
+    /// Bits of the index of a clock.
+    pub(super) fn index_bits(&self) -> u32 {
+        usize::BITS - (self.clocks - 1).leading_zeros()
+    }
+
     /// The taps of a phase at each clock of a multiplier. They are zero where it has no sample left.
-    fn taps(&self, filters: &IntegerFilters, phase: usize, multiplier: usize) -> Vec<i64> {
+    pub(super) fn taps(&self, taps: &PolyphaseTaps<i64>, phase: usize, multiplier: usize) -> Vec<i64> {
         let samples = self.samples.iter().skip(multiplier * self.clocks).take(self.clocks);
-        let mut taps: Vec<i64> = samples.map(|&(i, j)| filters.taps.get(i, phase, j)).collect();
+        let mut taps: Vec<i64> = samples.map(|&(i, j)| taps.get(i, phase, j)).collect();
         taps.resize(self.clocks, 0);
         taps
     }
@@ -46,10 +52,11 @@ pub(super) fn folded(
     netlist: &mut Netlist,
     filters: &IntegerFilters,
     schedule: &Schedule,
+    mut port: Option<&mut LoadPort>,
     bits: u32,
     output: OutputRounding,
 ) -> (usize, usize) {
-    write_history(netlist, filters, schedule, bits);
+    write_history(netlist, filters, schedule, port.as_deref_mut(), bits);
     let mut rom = Rom { cases: vec![String::new(); schedule.clocks], bits: 0, products: BTreeMap::new() };
     let mut products = vec![Vec::new(); filters.taps.ratio];
     for (m, samples) in schedule.samples.chunks(schedule.clocks).enumerate() {
@@ -59,7 +66,16 @@ pub(super) fn folded(
             let _ = write!(case, " {} <= x{}_{j};", a.name, i + 1);
         }
         for (p, products) in products.iter_mut().enumerate() {
-            products.extend(rom.product(netlist, &a, &format!("q{p}_{m}"), &schedule.taps(filters, p, m)));
+            let (name, taps) = (format!("q{p}_{m}"), schedule.taps(&filters.taps, p, m));
+            products.extend(match &mut port {
+                Some(port) => port.product(netlist, &a, &name, &schedule.taps(&port.tap_bits, p, m), &taps),
+                None => rom.product(netlist, &a, &name, &taps),
+            });
+        }
+    }
+    if let Some(port) = &mut port {
+        for (p, products) in products.iter_mut().enumerate() {
+            products.push(port.constant(netlist, p, -filters.constants[p]).into());
         }
     }
     let sums: Vec<_> = products.into_iter().map(|products| netlist.sum(products)).collect();
@@ -67,7 +83,15 @@ pub(super) fn folded(
     write_control(netlist, &rom.cases, stage);
     for (p, sum) in sums.into_iter().enumerate() {
         let sum = sum.map(|term| ShiftedWord { word: netlist.at_stage(term.word, stage), ..term });
-        accumulate(netlist, filters, p, sum, stage, bits, output);
+        let (start, sums) = match &port {
+            Some(port) => (0, port.sums(p)),
+            None => (-i128::from(filters.constants[p]), filters.sums(p, bits)),
+        };
+        accumulate(netlist, start, sums, p, sum, stage, output);
+    }
+    if let Some(port) = port {
+        port.write(netlist);
+        rom.bits = port.bits;
     }
     (schedule.clocks + stage + 2, rom.bits)
 }
@@ -120,18 +144,28 @@ impl Rom {
 }
 
 /// The last samples of each channel. After the reset they are those without a signal.
-fn write_history(netlist: &mut Netlist, filters: &IntegerFilters, schedule: &Schedule, bits: u32) {
+fn write_history(
+    netlist: &mut Netlist,
+    filters: &IntegerFilters,
+    schedule: &Schedule,
+    mut port: Option<&mut LoadPort>,
+    bits: u32,
+) {
     let (mut reset, mut shift) = (String::new(), String::new());
     for i in 0..filters.taps.channels {
         let lags = schedule.lags(i);
         if lags == 0 {
             netlist.leave(format!("x{}", i + 1));
         }
+        let resting = match &mut port {
+            Some(port) => port.resting(netlist, i, bits, filters.resting[i]),
+            None => constant(filters.resting[i].into(), bits),
+        };
         for j in 0..lags {
             let name = format!("x{}_{j}", i + 1);
             let before = j.checked_sub(1).map_or_else(String::new, |j| format!("_{j}"));
             netlist.declare_register(&name, bits);
-            let _ = writeln!(reset, "            {name} <= {};", constant(filters.resting[i].into(), bits));
+            let _ = writeln!(reset, "            {name} <= {resting};");
             let _ = writeln!(shift, "            {name} <= x{}{before};", i + 1);
         }
     }
@@ -183,15 +217,13 @@ fn write_control(netlist: &mut Netlist, cases: &[String], stage: usize) {
 /// The accumulator of a phase, and its output.
 fn accumulate(
     netlist: &mut Netlist,
-    filters: &IntegerFilters,
+    start: i128,
+    sums: Range,
     phase: usize,
     sum: Option<ShiftedWord>,
     stage: usize,
-    input_bits: u32,
     output: OutputRounding,
 ) {
-    let start = -i128::from(filters.constants[phase]);
-    let sums = filters.sums(phase, input_bits);
     // Where no sum wraps, the accumulator begins with the half that rounds. Sums on the way may leave its
     // bits and come back.
     let half = if netlist.holds(sums) { output.half() } else { 0 };

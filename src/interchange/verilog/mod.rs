@@ -1,9 +1,11 @@
 //! A bank of integer taps as a module in Verilog-2001, with the bits of [`BitTrue`].
 //!
 //! Words are as wide as their exact ranges, which follow from the taps and the bits of the samples, or as
-//! the accumulator where that is less. Adders of a tree have registers in between.
+//! the accumulator where that is less. Adders of a tree have registers in between. Taps are constants, or words
+//! that a host loads.
 
 mod folded;
+mod load;
 mod netlist;
 mod output;
 mod parallel;
@@ -12,8 +14,10 @@ mod testbench;
 use super::bit_true::{BitTrue, IntegerFilters, WordSizes};
 use super::c99;
 use super::error::ExportError;
-use crate::bank::Bank;
+use crate::bank::{Bank, FixedPoint};
+use crate::spec::WordLengths;
 use folded::{Schedule, folded};
+use load::LoadPort;
 use netlist::Netlist;
 use output::OutputRounding;
 use parallel::parallel;
@@ -32,15 +36,27 @@ pub struct VerilogOptions {
     pub accumulator_bits: Option<u32>,
     /// Clocks between two frames. With more than one, each multiplier serves as many taps.
     pub clocks_per_frame: NonZeroU32,
+    /// Frames that a clock takes. With more than one, `clocks_per_frame` must be 1.
+    pub frames_per_clock: NonZeroU32,
     /// Levels of adders between two registers.
     pub pipeline: NonZeroU32,
+    /// Whether taps and offsets are written through a port.
+    pub is_loadable: bool,
 }
 
 impl Default for VerilogOptions {
     fn default() -> Self {
         let one = NonZeroU32::MIN;
         let (input_bits, output_bits, accumulator_bits) = (None, None, None);
-        Self { input_bits, output_bits, accumulator_bits, clocks_per_frame: one, pipeline: one }
+        Self {
+            input_bits,
+            output_bits,
+            accumulator_bits,
+            clocks_per_frame: one,
+            frames_per_clock: one,
+            pipeline: one,
+            is_loadable: false,
+        }
     }
 }
 
@@ -52,7 +68,17 @@ impl VerilogOptions {
         let (accumulator, output) = (self.accumulator_bits.unwrap_or(64), self.output_bits.unwrap_or(input));
         Ok(WordSizes { input, accumulator, output })
     }
+
+    fn check_clocks(&self) -> Result<(), ExportError> {
+        let (frames, clocks) = (self.frames_per_clock.get(), self.clocks_per_frame.get());
+        let most = MOST_FRAMES_PER_CLOCK;
+        let is_circuit = frames == 1 || clocks == 1 && frames <= most;
+        if is_circuit { Ok(()) } else { Err(ExportError::Clocks { frames, clocks, most }) }
+    }
 }
+
+/// Frames of a clock, at most: each has ports of its own.
+const MOST_FRAMES_PER_CLOCK: u32 = 64;
 
 /// What a circuit takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -61,14 +87,20 @@ pub struct Circuit {
     pub latency_clocks: usize,
     /// Clocks between two frames at least.
     pub clocks_per_frame: usize,
+    /// Frames that a clock takes.
+    pub frames_per_clock: usize,
     /// Operators * of two words, or of a word and a constant that is no power of two.
     pub multipliers: usize,
     /// Operators + and -.
     pub adders: usize,
     /// Bits of all registers.
     pub registers: usize,
-    /// Bits of the coefficients, where multipliers serve several taps.
+    /// Bits of the coefficients, where multipliers serve several taps or the coefficients are loaded.
     pub rom_bits: usize,
+    /// Words of a bank that are loaded; 0 where the circuit holds one bank for ever.
+    pub load_words: usize,
+    /// Bits of the port of these words.
+    pub load_data_bits: u32,
     /// Bits with which no sum can wrap.
     pub needed_accumulator_bits: u32,
     /// Bits of the accumulator; fewer than needed wrap.
@@ -84,9 +116,13 @@ pub struct Verilog {
     has_ready: bool,
     /// The module.
     pub text: String,
+    /// What a port of coefficients takes, as `$readmemh` reads it: the words of this bank by their addresses.
+    pub load: Option<String>,
     /// What it takes.
     pub circuit: Circuit,
     model: BitTrue,
+    bank: Bank,
+    options: VerilogOptions,
 }
 
 impl Verilog {
@@ -99,41 +135,60 @@ impl Verilog {
         check_name(name)?;
         let integers = bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format: "Verilog" })?;
         let words = options.words(bank)?;
+        options.check_clocks()?;
         let model = BitTrue::new(bank, words)?;
-        let needed = model.needed_bits();
-        let filters = &model.filters.modulo(words.accumulator);
+        let (frames, clocks) =
+            (options.frames_per_clock.get() as usize, options.clocks_per_frame.get() as usize);
+        let filters = &model.filters.modulo(words.accumulator).of_blocks(frames);
         let mut netlist = Netlist::new(options.pipeline.get(), words.accumulator);
         let output = OutputRounding::new(words.output, integers.fraction_bits);
-        let (clocks_per_frame, latency_clocks, rom_bits) = match options.clocks_per_frame.get() as usize {
-            1 => (1, parallel(&mut netlist, filters, words.input, output), 0),
-            clocks => {
-                let schedule = Schedule::new(filters, clocks);
-                let (latency, rom) = folded(&mut netlist, filters, &schedule, words.input, output);
-                (schedule.clocks, latency, rom)
-            }
+        let loaded =
+            options.is_loadable.then(|| LoadPort::new(integers, bank.ratio, frames, clocks, words.input));
+        let (mut port, schedule) = match loaded.transpose()? {
+            Some((port, schedule)) => (Some(port), Some(schedule)),
+            None => (None, (clocks > 1).then(|| Schedule::new(&filters.taps, clocks))),
+        };
+        let needed = port.as_ref().map_or_else(|| model.needed_bits(), LoadPort::needed_bits);
+        let (latency_clocks, rom_bits) = match &schedule {
+            None => (parallel(&mut netlist, filters, words.input, output), 0),
+            Some(schedule) => folded(&mut netlist, filters, schedule, port.as_mut(), words.input, output),
         };
         let circuit = Circuit {
             latency_clocks,
-            clocks_per_frame,
+            clocks_per_frame: schedule.as_ref().map_or(1, |schedule| schedule.clocks),
+            frames_per_clock: frames,
             multipliers: netlist.multipliers,
             adders: netlist.adders,
             registers: netlist.registers,
             rom_bits,
+            load_words: port.as_ref().map_or(0, LoadPort::word_count),
+            load_data_bits: port.as_ref().map_or(0, LoadPort::data_bits),
             needed_accumulator_bits: needed,
             accumulator_bits: needed.min(words.accumulator),
         };
-        let has_ready = options.clocks_per_frame.get() > 1;
-        let module = ports(filters, words, has_ready) + &netlist.body();
+        let has_ready = schedule.is_some();
+        let module = ports(filters, words, has_ready, port.as_ref()) + &netlist.body();
         let is_word = |word: &str| word == name;
         if module.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').any(is_word) {
             return Err(ExportError::NameOfSignal { name: name.to_owned() });
         }
-        let text = about(bank, &model, words, &circuit) + &format!("module {name} (\n") + &module;
-        Ok(Self { name: name.to_owned(), has_ready, text: text + "endmodule\n", circuit, model })
+        let layout = layout(bank, integers, words, options);
+        let text = about(bank, &model, words, &circuit, &layout) + &format!("module {name} (\n") + &module;
+        Ok(Self {
+            name: name.to_owned(),
+            has_ready,
+            text: text + "endmodule\n",
+            load: port.map(|port| format!("// {}\n// {layout}\n{}", c99::title(bank), port.text())),
+            circuit,
+            model,
+            bank: bank.clone(),
+            options: *options,
+        })
     }
 
     /// A test of the module: names and texts of its files. Its frames are impulses, full-scale steps, those
-    /// that make the largest and the least sum of each phase, and `random` random ones.
+    /// that make the largest and the least sum of each phase, and `random` random ones. It loads two banks into
+    /// a loadable module: this one, and one with other taps and offsets between two frames.
     ///
     /// # Errors
     /// [`ExportError::Frames`] for more random frames than [`MOST_RANDOM_FRAMES`].
@@ -161,16 +216,33 @@ fn check_name(name: &str) -> Result<(), ExportError> {
     }
 }
 
-fn about(bank: &Bank, model: &BitTrue, words: WordSizes, circuit: &Circuit) -> String {
+fn about(bank: &Bank, model: &BitTrue, words: WordSizes, circuit: &Circuit, layout: &str) -> String {
     let Circuit { latency_clocks, clocks_per_frame, multipliers, adders, registers, rom_bits, .. } = circuit;
-    let (samples, outputs) =
-        (listed("sample", "x", 1..bank.frame_samples() + 1), listed("output", "y", 0..bank.ratio));
+    let frames = circuit.frames_per_clock;
+    let (samples, outputs) = (
+        listed("sample", "x", 1..bank.frame_samples() * frames + 1),
+        listed("output", "y", 0..bank.ratio * frames),
+    );
+    let taken = match frames {
+        1 => "a frame".to_owned(),
+        _ => format!("{frames} frames, one after the other"),
+    };
+    let load = match circuit.load_words {
+        0 => String::new(),
+        words => format!(
+            "\n\n   load_write puts load_data at load_address of the words that do not run, 0 to {}.\n   \
+             A clock with commit and in_ready exchanges them with those that run; a frame of this clock has the new\n   \
+             ones. Before the next commit all words must be written again. rst keeps them, and begins with the\n   \
+             samples at rest of those that run.\n   {layout}",
+            words - 1
+        ),
+    };
     format!(
         "/* {}\n   Written by hybank. Verilog-2001, no primitives.\n\n   \
-         A clock with in_valid takes a frame: {samples} of {} bits, {}. {latency_clocks} clocks\n   \
+         A clock with in_valid takes {taken}: {samples} of {} bits, {}. {latency_clocks} clocks\n   \
          later out_valid is there with {outputs} of {} bits. Frames may come at every\n   \
          {}. rst clears all at a clock. The latency of the filters is {} (output samples).\n   {}.\n   \
-         {}.\n\n   \
+         {}.{load}\n\n   \
          Before optimisation: multipliers {multipliers}, adders {adders}, bits of registers {registers}, of ROM {rom_bits} */\n",
         c99::title(bank),
         words.input,
@@ -183,6 +255,26 @@ fn about(bank: &Bank, model: &BitTrue, words: WordSizes, circuit: &Circuit) -> S
         bank.latency,
         c99::gammas(bank),
         arithmetic(model, words, circuit.needed_accumulator_bits),
+    )
+}
+
+/// What two banks must have in common to be loaded into one module.
+fn layout(bank: &Bank, taps: &FixedPoint, words: WordSizes, options: &VerilogOptions) -> String {
+    let bits = match &taps.bits {
+        WordLengths::Same(bits) => bits.to_string(),
+        WordLengths::PerTap(bits) => bits.iter().map(u32::to_string).collect::<Vec<_>>().join(" "),
+    };
+    format!(
+        "Layout: {} samples and {} outputs a frame, {} taps of {bits} bits times 2^{}, samples of {} bits, \
+         accumulator of {}, {} clocks per frame, {} frames per clock",
+        bank.frame_samples(),
+        bank.ratio,
+        taps.integers.first().map_or(0, Vec::len),
+        -taps.fraction_bits,
+        words.input,
+        words.accumulator,
+        options.clocks_per_frame,
+        options.frames_per_clock,
     )
 }
 
@@ -217,9 +309,10 @@ fn arithmetic(model: &BitTrue, words: WordSizes, needed: u32) -> String {
 }
 
 /// The list of ports, and the end of the head of the module.
-fn ports(filters: &IntegerFilters, words: WordSizes, has_ready: bool) -> String {
+fn ports(filters: &IntegerFilters, words: WordSizes, has_ready: bool, load: Option<&LoadPort>) -> String {
     let mut ports = vec!["input wire clk".to_owned(), "input wire rst".into(), "input wire in_valid".into()];
     ports.extend(has_ready.then(|| "output wire in_ready".into()));
+    ports.extend(load.map(LoadPort::ports).unwrap_or_default());
     let word = |kind: &str, bits: u32, name: String| format!("{kind} signed [{}:0] {name}", bits - 1);
     ports.extend((1..=filters.taps.channels).map(|i| word("input wire", words.input, format!("x{i}"))));
     ports.push("output wire out_valid".into());

@@ -1,7 +1,9 @@
 //! A self-checking testbench: frames and the outputs that the bit-true model gives for them.
 
 use super::Verilog;
+use crate::bank::{Bank, FixedPoint};
 use crate::interchange::ExportError;
+use crate::interchange::bit_true::BitTrue;
 use crate::interchange::layout::PolyphaseTaps;
 use std::fmt::Write;
 
@@ -15,18 +17,47 @@ pub(super) fn files(verilog: &Verilog, random: u32) -> Result<Vec<(String, Strin
     }
     let mut model = verilog.model.clone();
     let taps = model.filters.taps.clone();
-    let frames = frames(&taps, verilog.model.words.input, &model.resting(), random);
-    let (mut input, mut expected) = (String::new(), String::new());
-    for frame in frames.chunks(taps.channels) {
-        write_line(&mut input, frame);
-        write_line(&mut expected, &model.filtered(frame));
+    let (mut input, mut expected, mut files) = (String::new(), String::new(), Vec::new());
+    let mut add = |model: &mut BitTrue| {
+        let frames = frames(&model.filters.taps, model.words.input, &model.resting(), random);
+        // A line has the frames of a clock.
+        let length = taps.channels * verilog.circuit.frames_per_clock;
+        for line in frames.chunks(length) {
+            let mut line = line.to_vec();
+            line.extend(model.resting().iter().cycle().take(length - line.len()));
+            write_line(&mut input, &line);
+            write_line(&mut expected, &model.filtered(&line));
+        }
+        input.lines().count()
+    };
+    let first = add(&mut model);
+    let mut lines = first;
+    if let Some(load) = &verilog.load {
+        let next = Verilog::new(&other_bank(&verilog.bank), &verilog.name, &verilog.options)?;
+        // The history stays.
+        model.filters = next.model.filters;
+        lines = add(&mut model);
+        files.push(("load.mem".to_owned(), load.clone()));
+        files.extend(next.load.map(|load| ("next.mem".to_owned(), load)));
     }
-    let bench = bench(verilog, &taps, frames.len() / taps.channels);
-    Ok(vec![
-        (format!("{}_tb.v", verilog.name), bench),
-        ("input.txt".to_owned(), input),
-        ("expected.txt".to_owned(), expected),
-    ])
+    files.push((format!("{}_tb.v", verilog.name), bench(verilog, &taps, first, lines)));
+    files.extend([("input.txt".to_owned(), input), ("expected.txt".to_owned(), expected)]);
+    Ok(files)
+}
+
+/// A bank with other taps, of the same bits, and other offsets.
+fn other_bank(bank: &Bank) -> Bank {
+    let other = |words: &FixedPoint| {
+        let tap = |(n, tap): (usize, &i64)| if words.bits.bits(n) == 0 { 0 } else { !tap };
+        let integers =
+            words.integers.iter().rev().map(|taps| taps.iter().enumerate().map(tap).collect()).collect();
+        FixedPoint { integers, ..words.clone() }
+    };
+    Bank {
+        fixed_point: bank.fixed_point.as_ref().map(other),
+        offsets: bank.offsets.iter().map(|offset| 0.25 - offset / 2.0).collect(),
+        ..bank.clone()
+    }
 }
 
 fn write_line(text: &mut String, words: &[i32]) {
@@ -65,10 +96,12 @@ fn frames(taps: &PolyphaseTaps<i64>, bits: u32, resting: &[i32], random: u32) ->
     frames
 }
 
-fn bench(verilog: &Verilog, taps: &PolyphaseTaps<i64>, frames: usize) -> String {
+/// The testbench of so many lines of frames, of which the first ones belong to the bank that begins.
+fn bench(verilog: &Verilog, taps: &PolyphaseTaps<i64>, first: usize, lines: usize) -> String {
     let (words, circuit) = (verilog.model.words, &verilog.circuit);
-    let inputs: Vec<String> = (1..=taps.channels).map(|i| format!("x{i}")).collect();
-    let outputs: Vec<String> = (0..taps.ratio).map(|p| format!("y{p}")).collect();
+    let inputs: Vec<String> =
+        (1..=taps.channels * circuit.frames_per_clock).map(|i| format!("x{i}")).collect();
+    let outputs: Vec<String> = (0..taps.ratio * circuit.frames_per_clock).map(|p| format!("y{p}")).collect();
     let expected: Vec<String> = outputs.iter().map(|y| format!("expected_{y}")).collect();
     // Not every simulator cuts a number that it reads to the bits of a word.
     let read = |names: &[String], after: &str| {
@@ -77,6 +110,10 @@ fn bench(verilog: &Verilog, taps: &PolyphaseTaps<i64>, frames: usize) -> String 
     };
     let cut = |names: &[String], bits: u32| read(names, &format!("[{}:0]", bits - 1));
     let mut ports: String = inputs.iter().chain(&outputs).map(|port| format!(", .{port}({port})")).collect();
+    if verilog.load.is_some() {
+        ports +=
+            ", .load_write(load_write), .load_address(load_address), .load_data(load_data), .commit(commit)";
+    }
     let ready = if verilog.has_ready {
         ports += ", .in_ready(in_ready)";
         ""
@@ -86,7 +123,11 @@ fn bench(verilog: &Verilog, taps: &PolyphaseTaps<i64>, frames: usize) -> String 
     let format_of = |names: &[String]| vec!["%d"; names.len()].join(" ");
     let parts = [
         ("NAME", verilog.name.clone()),
-        ("FRAMES", frames.to_string()),
+        ("FRAMES", lines.to_string()),
+        ("SWITCH", first.to_string()),
+        ("WORDS", circuit.load_words.to_string()),
+        ("ADDRESS_TOP", circuit.load_words.saturating_sub(1).max(1).ilog2().to_string()),
+        ("DATA_TOP", circuit.load_data_bits.saturating_sub(1).to_string()),
         ("LATENCY", circuit.latency_clocks.to_string()),
         ("CLOCKS", circuit.clocks_per_frame.to_string()),
         ("INPUT_TOP", (words.input - 1).to_string()),
@@ -106,5 +147,10 @@ fn bench(verilog: &Verilog, taps: &PolyphaseTaps<i64>, frames: usize) -> String 
         ("READY", ready.to_owned()),
     ];
     let fill = |text: String, (key, value): &(&str, String)| text.replace(&format!("@{key}@"), value);
-    parts.iter().fold(include_str!("testbench.v").to_owned(), fill)
+    // Some lines are those of a loadable module.
+    let line = |line: &'static str| match line.strip_prefix("@LOAD@") {
+        Some(line) => verilog.load.is_some().then(|| format!("{line}\n")),
+        None => Some(format!("{line}\n")),
+    };
+    parts.iter().fold(include_str!("testbench.v").lines().filter_map(line).collect(), fill)
 }

@@ -7,6 +7,11 @@ module @NAME@_tb;
     // The outputs of the second pass, one in a line, if this is a name.
     parameter OUTPUT = "";
     parameter FRAMES = @FRAMES@;
+@LOAD@    // The words of the bank that begins, and those of the bank from frame SWITCH on.
+@LOAD@    parameter LOAD = "load.mem";
+@LOAD@    parameter NEXT = "next.mem";
+@LOAD@    parameter SWITCH = @SWITCH@;
+@LOAD@    localparam WORDS = @WORDS@;
     localparam LATENCY = @LATENCY@;
     localparam CLOCKS = @CLOCKS@;
 
@@ -20,6 +25,11 @@ module @NAME@_tb;
     reg [31:0] noise;
     // What a line of a file holds.
     integer @READ@;
+@LOAD@    reg load_write, commit;
+@LOAD@    reg [@ADDRESS_TOP@:0] load_address;
+@LOAD@    reg [@DATA_TOP@:0] load_data;
+@LOAD@    reg [@DATA_TOP@:0] words [0:WORDS-1];
+@LOAD@    integer loaded;
     integer given, wanted, written, pass, sent, received, age, errors, code;
 
     @NAME@ dut (.clk(clk), .rst(rst), .in_valid(in_valid), .out_valid(out_valid)@PORTS@);
@@ -43,6 +53,20 @@ module @NAME@_tb;
             written = 0;
             if (pass == 1 && OUTPUT != "") written = $fopen(OUTPUT, "w");
             rst = 1'b1;
+@LOAD@            $readmemh(LOAD, words);
+@LOAD@            commit = 1'b0;
+@LOAD@            load_write = 1'b1;
+@LOAD@            for (loaded = 0; loaded < WORDS; loaded = loaded + 1) begin
+@LOAD@                load_address = loaded;
+@LOAD@                load_data = words[loaded];
+@LOAD@                @(negedge clk);
+@LOAD@            end
+@LOAD@            load_write = 1'b0;
+@LOAD@            commit = 1'b1;
+@LOAD@            @(negedge clk);
+@LOAD@            commit = 1'b0;
+@LOAD@            $readmemh(NEXT, words);
+@LOAD@            loaded = 0;
             @(negedge clk);
             rst = 1'b0;
             pending = 0;
@@ -56,6 +80,13 @@ module @NAME@_tb;
                     errors = errors + 1;
                 end
                 in_valid = in_ready && sent < FRAMES && (pass == 0 || noise[0]);
+@LOAD@                // The next words while the first ones run, then noise where the first ones were.
+@LOAD@                if (sent == SWITCH && loaded < WORDS) in_valid = 1'b0;
+@LOAD@                commit = in_valid ? sent == SWITCH : ~in_ready & noise[1];
+@LOAD@                load_write = loaded < WORDS || sent > SWITCH;
+@LOAD@                load_address = loaded < WORDS ? loaded : noise % WORDS;
+@LOAD@                load_data = loaded < WORDS ? words[loaded] : noise;
+@LOAD@                if (loaded < WORDS) loaded = loaded + 1;
                 if (in_valid) begin
                     code = $fscanf(given, "@INPUT_FORMAT@", @READ_INPUTS@);
                     {@INPUTS@} = {@CUT_INPUTS@};
