@@ -84,7 +84,7 @@ impl Panel {
     fn new(title: &'static str, samples: &[f64], rate: f64) -> Self {
         let spectrum = RecordSpectrum::new(samples, Hertz(rate), Window::Bh7);
         let columns = (COLUMNS as f64 * rate / (2.0 * HIGHEST)) as usize;
-        let largest = spectrum.largest();
+        let (_, largest) = spectrum.largest();
         let level = |(f, a): (Hertz, f64)| (f.0, (20.0 * (a / largest).log10()).max(FLOOR));
         Self { title, points: spectrum.columns(columns).into_iter().map(level).collect() }
     }

@@ -180,8 +180,8 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     show(&report, args.json, |report| report.text(args.verbose))
 }
 
-/// Writes the bank, and once more if the search for its proof changes it, so that an interrupt loses no bank;
-/// standard output gets it once.
+/// Writes the bank, and once more if the search for its proof changes it, so that an interrupt loses no
+/// bank; standard output gets it once.
 fn written(args: &Args, design: Design, time: Duration) -> Result<Searched, Failure> {
     let text = |design: &Design| design.bank.to_json().map_err(failed);
     let (finished, once) = (text(&design)?, is_dash(&args.output));

@@ -105,8 +105,8 @@ struct VerilogArgs {
     /// [default: 1]
     #[arg(long, value_name = "P")]
     frames_per_clock: Option<NonZeroU32>,
-    /// Taps and offsets are written through a port, so that one synthesis serves every bank of this size; with
-    /// --format mem the words of such a port
+    /// Taps and offsets are written through a port, so that one synthesis serves every bank of this size;
+    /// with --format mem the words of such a port
     #[arg(long)]
     loadable: bool,
     /// Levels of adders between two registers [default: 1]

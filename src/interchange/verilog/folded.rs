@@ -1,6 +1,6 @@
 //! A frame at every C clocks: filters in direct form. Each multiplier takes C samples of the history one
-//! after another, with their coefficients from a ROM or from words that were loaded; a tree adds the products
-//! of a phase, and an accumulator adds the clocks.
+//! after another, with their coefficients from a ROM or from words that were loaded; a tree adds the
+//! products of a phase, and an accumulator adds the clocks.
 
 use super::load::LoadPort;
 use super::netlist::{Netlist, ShiftedWord, Word, constant, wrapped};
