@@ -68,11 +68,13 @@ fn designed(spec: &Value) -> Result<Bank, String> {
 #[test]
 fn extreme_numbers_of_specs_are_refused_by_their_key() {
     let (mut answers, mut refusals) = (0, 0);
+    // Else every other one, in turns.
+    let step = if trials::is_slow("every extreme number in every key of a spec") { 1 } else { 2 };
     for text in SPECS {
         let spec: Value = serde_json::from_str(text).unwrap();
         designed(&spec).unwrap();
-        for path in leaves(&spec, "") {
-            for extreme in EXTREMES {
+        for (number, path) in leaves(&spec, "").into_iter().enumerate() {
+            for extreme in EXTREMES.into_iter().skip(number % step).step_by(step) {
                 let mut changed = spec.clone();
                 *changed.pointer_mut(&path).unwrap() = extreme.into();
                 match designed(&changed) {

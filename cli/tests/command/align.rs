@@ -135,8 +135,8 @@ fn drifts_are_found_within_their_intervals() {
     let case = |event, seconds, ppm, late| Case { event, seconds, ppm, late };
     let mut cases = vec![
         case(Event::Noise, 2.0, 20.0, 0.31),
-        case(Event::Music, 4.0, -100.0, 1.5),
-        case(Event::Speech, 4.0, 1.0, -1.0),
+        case(Event::Music, 9.0, -100.0, 4.0),
+        case(Event::Speech, 8.0, 1.0, -2.0),
     ];
     if is_sweep {
         let events = [Event::Noise, Event::Music, Event::Speech];

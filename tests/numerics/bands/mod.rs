@@ -49,7 +49,11 @@ fn figures(bank: &Bank) -> [f64; 2] {
 
 #[test]
 fn banks_for_a_band_reach_the_figures_of_the_table() {
+    let most = if trials::is_slow("a bank of eight channels for a band") { 8 } else { 4 };
     for System { spec, without, with_band } in systems() {
+        if spec.channels.len() > most {
+            continue;
+        }
         let (name, found) = (&spec.name, reached(&spec));
         println!("{name}: {found:.1?} dB with the band, table {with_band:?} dB; without {without:?} dB");
         // Beyond 160 dB the figure depends on the last digits of the solver: the mean-square optimum of A
