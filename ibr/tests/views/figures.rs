@@ -98,7 +98,9 @@ fn erroneous(map: &DepthMap, deviation: f64, seed: u64) -> DepthMap {
 /// is read. Without that the views have 28.0, 28.7, 27.8 and 27.2 dB.
 #[test]
 fn errors_of_depth_are_measured_and_smoothed() {
-    for (errors, least) in [([1.0, 0.0], 29.3), ([0.0, 1.0], 28.9), ([0.0, 2.0], 28.5), ([1.0, 1.0], 29.1)] {
+    let all = [([1.0, 1.0], 29.1), ([0.0, 2.0], 28.5), ([1.0, 0.0], 29.3), ([0.0, 1.0], 28.9)];
+    let count = if trials::is_slow("errors of depth in either map") { 4 } else { 2 };
+    for (errors, least) in all.into_iter().take(count) {
         let Some(mut pair) = pair("cones") else { return };
         for (seed, (map, error)) in (11..).zip(pair.maps.iter_mut().zip(errors)) {
             *map = erroneous(map, error, seed);
@@ -106,7 +108,6 @@ fn errors_of_depth_are_measured_and_smoothed() {
         let found = Agreement::of(&views(&pair)).depth_errors;
         println!("errors {errors:?}, found {found:.2?}");
         assert!(found.iter().zip(errors).all(|(found, error)| (found - error).abs() <= 0.15), "{found:?}");
-        psnr(&pair, &RenderSettings::default());
         let restored = restore(&views(&pair));
         pair.maps.iter_mut().zip(restored).for_each(|(map, restored)| *map = restored.map);
         assert!(psnr(&pair, &RenderSettings::default()) >= least);

@@ -94,12 +94,15 @@ fn a_sky_is_far_away() {
     let (path, truth) = sky::write(folder.path()).unwrap();
     let case = Case::read(&path, &truth).unwrap();
     let of = |value: f32| case.rendered(Damage::Sky(value), folder.path()).unwrap();
-    let (far, number, unknown, zero) = (of(f32::INFINITY), of(1e10), of(f32::NAN), of(0.0));
+    let (far, unknown) = (of(f32::INFINITY), of(f32::NAN));
     assert!(far.psnr > 34.5 && far.coverage > 0.97, "{} {}", far.psnr, far.coverage);
-    assert!((far.psnr - number.psnr).abs() < 1e-9, "{}", number.psnr);
     // Filled from its neighbours it was 23.5 dB.
     assert!((far.psnr - unknown.psnr).abs() < 0.1, "{} {}", far.psnr, unknown.psnr);
-    assert_eq!((unknown.psnr, unknown.coverage), (zero.psnr, zero.coverage));
+    if trials::is_slow("a sky that is a large number or zero") {
+        let (number, zero) = (of(1e10), of(0.0));
+        assert!((far.psnr - number.psnr).abs() < 1e-9, "{}", number.psnr);
+        assert_eq!((unknown.psnr, unknown.coverage), (zero.psnr, zero.coverage));
+    }
     // Points of a lidar, of which the sky returns none, and as many with the sky among them.
     let scattered = |damage: Damage| case.rendered(damage, folder.path()).unwrap();
     let (empty, whole) = (scattered(Damage::ScatteredSky(0.03)), scattered(Damage::Scattered(0.03)));
