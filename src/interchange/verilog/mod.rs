@@ -1,8 +1,8 @@
 //! A bank of integer taps as a module in Verilog-2001, with the bits of [`BitTrue`].
 //!
 //! Words are as wide as their exact ranges, which follow from the taps and the bits of the samples, or as
-//! the accumulator where that is less. Adders of a tree have registers in between. Taps are constants, or words
-//! that a host loads.
+//! the accumulator where that is less. Adders of a tree have registers in between. Taps are constants, or
+//! words that a host loads.
 
 mod folded;
 mod load;
@@ -187,8 +187,8 @@ impl Verilog {
     }
 
     /// A test of the module: names and texts of its files. Its frames are impulses, full-scale steps, those
-    /// that make the largest and the least sum of each phase, and `random` random ones. It loads two banks into
-    /// a loadable module: this one, and one with other taps and offsets between two frames.
+    /// that make the largest and the least sum of each phase, and `random` random ones. It loads two banks
+    /// into a loadable module: this one, and one with other taps and offsets between two frames.
     ///
     /// # Errors
     /// [`ExportError::Frames`] for more random frames than [`MOST_RANDOM_FRAMES`].
