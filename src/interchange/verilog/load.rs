@@ -9,11 +9,13 @@ use crate::interchange::bit_true::{IntegerFilters, Range};
 use crate::interchange::layout::PolyphaseTaps;
 use std::fmt::Write;
 
-/// Words at successive addresses, one for each clock of a frame.
+/// Words at successive addresses, one for each clock of a frame, or the same one for all of them.
 #[derive(Debug)]
 struct Memory {
     name: String,
     bits: u32,
+    /// Bits of the address in it.
+    index_bits: u32,
 }
 
 /// The port, and the words of a bank in the order of their addresses.
@@ -102,25 +104,34 @@ impl LoadPort {
         bits: u32,
         resting: i64,
     ) -> String {
-        let memory = self.memory(netlist, &format!("x{}", channel + 1), bits, &[resting]);
-        let first = if self.index_bits == 0 { String::new() } else { format!(", {}'d0", self.index_bits) };
-        format!("{memory}[{{active{first}}}]")
+        let words = vec![resting; 1 << self.index_bits];
+        let memory = self.memory(netlist, &format!("x{}", channel + 1), bits, 0, words);
+        format!("{memory}[active]")
     }
 
     /// A register that takes the word of each clock.
     fn word(&mut self, netlist: &mut Netlist, name: &str, range: Range, words: &[i64]) -> Word {
-        let memory = self.memory(netlist, name, range.bits(), words);
+        let mut words = words.to_vec();
+        words.resize(1 << self.index_bits, 0);
+        let memory = self.memory(netlist, name, range.bits(), self.index_bits, words);
         let step = if self.index_bits == 0 { "" } else { ", step" };
         netlist.register(name, range.bits(), &format!("{memory}[{{active{step}}}]"));
         Word::at(1, name.to_owned(), range)
     }
 
-    fn memory(&mut self, netlist: &mut Netlist, name: &str, bits: u32, words: &[i64]) -> String {
-        let (name, length) = (format!("{name}_words"), 1 << self.index_bits);
-        let _ = writeln!(netlist.text, "    reg signed [{}:0] {name} [0:{}];", bits - 1, 2 * length - 1);
-        self.bits += 2 * length * bits as usize;
-        self.words.extend((0..length).map(|k| words.get(k).copied().unwrap_or(0)));
-        self.memories.push(Memory { name: name.clone(), bits });
+    fn memory(
+        &mut self,
+        netlist: &mut Netlist,
+        name: &str,
+        bits: u32,
+        index_bits: u32,
+        words: Vec<i64>,
+    ) -> String {
+        let (name, length) = (format!("{name}_words"), 2 << index_bits);
+        let _ = writeln!(netlist.text, "    reg signed [{}:0] {name} [0:{}];", bits - 1, length - 1);
+        self.bits += length * bits as usize;
+        self.words.extend(words);
+        self.memories.push(Memory { name: name.clone(), bits, index_bits });
         name
     }
 
@@ -146,9 +157,12 @@ impl LoadPort {
     /// Writes what puts a word into its memory, and what exchanges the banks.
     pub(super) fn write(&self, netlist: &mut Netlist) {
         let (top, low) = (self.address_bits() - 1, self.index_bits);
-        let index = if low == 0 { String::new() } else { format!(", load_address[{}:0]", low - 1) };
         let mut cases = String::new();
-        for (number, Memory { name, bits }) in self.memories.iter().enumerate() {
+        for (number, Memory { name, bits, index_bits }) in self.memories.iter().enumerate() {
+            let index = match index_bits {
+                0 => String::new(),
+                bits => format!(", load_address[{}:0]", bits - 1),
+            };
             let label = format!("{}'d{number}", top + 1 - low);
             let _ = writeln!(
                 cases,
