@@ -172,7 +172,7 @@ impl FigureTerms<'_> {
     /// The SFDR at worst over the box of the spec's `[uncertainty]`.
     fn at_worst(&self) -> String {
         let worst = |ToneFigure { db, hertz }| {
-            format!("; at worst within their half-widths {}, at {}", rounded(-db), self.hertz(hertz))
+            format!("; at worst over the box of [uncertainty] {}, at {}", rounded(-db), self.hertz(hertz))
         };
         self.figures.image_at_worst.map_or_else(String::new, worst)
     }
