@@ -15,7 +15,7 @@ use hybank::calibrate::{
 use hybank::captures::{Captures, Converters};
 use hybank::messages::Quoted;
 use hybank::pipeline::matching::{check_channels, check_rate};
-use hybank::spec::{DesignOverrides, Spec};
+use hybank::spec::{DesignOverrides, DesignSpec, Method, Spec, leaves_the_design_open};
 use hybank::units::FastPeriods;
 use std::path::{Path, PathBuf};
 
@@ -31,7 +31,8 @@ const MOST_BLIND_MISFIT: f64 = 2.0;
 ///
 /// Fits what the captures say of the channels, relative to a reference channel, and writes the spec with
 /// these values and an [uncertainty] table with the half-widths of their intervals. Everything else of the
-/// spec is kept.
+/// spec is kept. Of converters that take turns (--interleaved) the spec asks for least-squares taps (method
+/// h2) where its [design] is empty.
 ///
 /// The captures hold sine tones (--tone, the default), a waveform that is known (--training), or any signal
 /// that leaves fewer aliases occupied than there are channels (--blind). Complex captures hold tones.
@@ -134,6 +135,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let done = args.calibrated(&spec, &mut warnings);
     // What the captures have may explain why they do not fit; a report has these warnings.
     let (calibrated, report) = done.inspect_err(|_| warnings.iter().for_each(|warning| warn(warning)))?;
+    let calibrated = args.with_method(calibrated, &text);
     let written = file.with_values(&text, &calibrated, &args.output).map_err(|problem| {
         report.warnings.iter().for_each(|warning| warn(warning));
         Failure::Input(format!("the values found make no spec: {problem}; nothing was written"))
@@ -143,6 +145,14 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 }
 
 impl Args {
+    /// The `calibrated` spec, with the least-squares taps for converters that take turns where the `text`
+    /// leaves the design open: circuits take no recursion.
+    fn with_method(&self, calibrated: Spec, text: &str) -> Spec {
+        let least_squares = Spec { design: DesignSpec::new(Method::H2, None), ..calibrated.clone() };
+        let is_default = self.interleaved.is_given() && leaves_the_design_open(text);
+        if is_default && least_squares.is_fir() { least_squares } else { calibrated }
+    }
+
     /// The calibrated spec and the report. `warnings` are those of the captures.
     fn calibrated(
         &self,

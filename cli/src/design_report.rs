@@ -168,11 +168,11 @@ impl<'a> DesignReport<'a> {
         }
     }
 
-    /// Six lines; all that is known with `verbose`.
+    /// Five lines, the last of them gamma; all that is known with `verbose`.
     pub(super) fn text(&self, verbose: bool) -> String {
         let terms = [self.heading(), figure_text(&self.judged.figures, self.is_normalised)].concat();
         if !verbose {
-            return terms + &self.gamma_line() + &self.choice() + &self.hint();
+            return terms + &self.choice() + &self.hint() + &self.gamma_line();
         }
         let parts = [
             format!("{}\n", self.understood),

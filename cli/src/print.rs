@@ -165,7 +165,7 @@ fn option(error: &dyn Any) -> Option<&'static str> {
             _ => None,
         })
         .or_else(|| match error.downcast_ref()? {
-            ExportError::NoIntegers { .. } => Some("`hybank design --method fir --bits B` designs them"),
+            ExportError::NoIntegers { .. } => Some("`hybank design --bits B` designs them"),
             ExportError::Offset { .. } => Some("--input-bits B does"),
             ExportError::NoInputBits => Some("--input-bits B does"),
             ExportError::NoWords => Some("leave out --input-bits"),

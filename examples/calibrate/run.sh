@@ -25,7 +25,7 @@ hybank calibrate "$here/spec.toml" $(four training) -o measured.toml --reference
 
 # A bank for the drawing and one for the converters; the second with its proof.
 hybank design "$here/spec.toml" -o nominal.json
-hybank design measured.toml -o measured.json
+hybank design --prove measured.toml -o measured.json
 hybank verify measured.json
 
 # The held-out tone through both.

@@ -19,7 +19,7 @@ hybank simulate "$here/spec.toml" -o captures --samples 153600 --gain 0.01 --noi
 hybank align "$here/spec.toml" captures/ch1.wav captures/ch2.wav -o aligned.toml --trim aligned --within 100ms
 
 # The bank, for all delays of the second recorder.
-hybank design aligned.toml -o bank.json
+hybank design aligned.toml -o bank.json --prove
 hybank verify bank.json
 
 hybank fuse bank.json aligned/ch1.wav aligned/ch2.wav -o fused.wav

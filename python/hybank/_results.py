@@ -148,13 +148,15 @@ class Figures:
     image
         The largest image of a tone in the band, ``db`` relative to it, and the ``hertz`` of the tone; None where a tone is
         lost. Of uncertain delays and gains the rms.
+    image_at_worst
+        The same at worst within the half-widths of uncertain delays and gains; None where all are exact.
     gain_error
         The same for the largest error of gain and phase.
     target_vanishes
         The target is zero somewhere in the band; the tones there are left out.
     simple
-        The simple ways, the best one first: ``way`` ("one-channel", "interleaving", "cubic-spline"), ``channel`` (from 1)
-        of the first one, and ``snr_db``.
+        The usual ways, the best one first: ``way`` ("one-channel", "interleaving", "own-correction", "cubic-spline"; last
+        "least-squares", which has taps as the bank has), ``channel`` (from 1) of the first one, and ``snr_db``.
     gain_over_simple_db
         The gain over the best of them, for the same converters.
     any_input
@@ -165,6 +167,7 @@ class Figures:
     snr: Record
     snr_16_bits_db: float | None
     image: Record | None
+    image_at_worst: Record | None
     gain_error: Record | None
     target_vanishes: bool
     simple: list[Record]

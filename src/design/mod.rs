@@ -47,6 +47,7 @@ pub use figure_band::{BandSource, FigureBand};
 pub use known_instants::instants_estimator;
 pub use length::TargetFigure;
 pub use limits::{Stage, Stop, TIME_LIMIT, remedy};
+pub(crate) use methods::mean_square_fir::least_squares_taps;
 pub use methods::robust_fir::{RobustNorms, RobustStudy};
 pub use missing::MissingSamples;
 pub use plant::LiftedPlant;

@@ -78,6 +78,11 @@ struct FilterRealisation<'a> {
 }
 
 impl FilterRealisation<'_> {
+    /// What the method of the spec minimises.
+    fn aim(&self) -> Aim {
+        if self.spec.design.method == Method::H2 { Aim::MeanSquare } else { Aim::WorstCase }
+    }
+
     /// The taps of all channels, quantised if the spec asks for integer taps.
     fn fir(&self, merged: &[Vec<f64>], synthesis: &Synthesis) -> Result<Realised, DesignError> {
         let design = &self.spec.design;
@@ -89,6 +94,7 @@ impl FilterRealisation<'_> {
             taps: &taps,
             noise: &self.whole.problem().noise,
             gamma_margin: design.gamma_margin.unwrap_or(0.0),
+            aim: self.aim(),
             stop: self.stop,
         };
         let gamma = peak.gain;
@@ -125,7 +131,7 @@ impl FilterRealisation<'_> {
             plant: &LiftedPlant::new(&distinct.problem),
             bank: &system.map_inputs(&self.merged.shares_of(&distinct)),
             order: block.a.len(),
-            aim: if self.spec.design.method == Method::H2 { Aim::MeanSquare } else { Aim::WorstCase },
+            aim: self.aim(),
             gamma_margin: self.spec.design.gamma_margin.unwrap_or(0.0),
             stop: self.stop,
         };

@@ -17,12 +17,14 @@
 //! resolved.
 //!
 //! # Simple ways
-//! One channel alone with its Wiener filter, plain interleaving, and the cubic spline through all samples,
-//! for the same signal, noise and uncertainty, from their exact periodically time-varying responses. A bank
+//! One channel alone with its Wiener filter, plain interleaving, each channel's own correction, and the cubic
+//! spline through all samples, for the same signal, noise and uncertainty, from their exact periodically
+//! time-varying responses. Beside them stand the taps of least squares that are as long as the bank's. A bank
 //! of one channel is not compared with one channel. Where the spec states no noise, all are compared with
 //! converters of 16 bits: without any noise one channel alone would be exact wherever the signal fits into
 //! it.
 
+mod correction;
 mod integral;
 mod powers;
 mod reconstruction;
@@ -34,7 +36,7 @@ mod spline;
 mod tests;
 
 pub use crate::design::{BandSource, FigureBand, ToneOutput};
-pub use setup::Setup;
+pub use setup::{NoiseSources, Setup};
 pub use simple::{Alone, SimpleFigure, SimpleWay};
 pub use snr::Snr;
 
@@ -63,11 +65,14 @@ pub struct Figures {
     pub snr_16_bits_db: Option<Decibels>,
     /// The largest image relative to its tone; `None` where the bank loses a tone of the band altogether.
     pub image: Option<ToneFigure>,
+    /// The largest image at worst over the box of the spec's `[uncertainty]`, to first order; `None` as for
+    /// `image`, and where all delays and gains are exact.
+    pub image_at_worst: Option<ToneFigure>,
     /// The largest relative error of gain and phase; `None` as for `image`.
     pub gain_error: Option<ToneFigure>,
     /// Whether the target is zero somewhere in the band; the tones there are left out.
     pub target_vanishes: bool,
-    /// The simple ways, the best one first.
+    /// The usual ways, the best one first; least-squares taps come last.
     pub simple: Vec<SimpleFigure>,
     /// gamma for inputs of any spectrum; `None` without `[signal]`, where gamma says it.
     pub any_input: Option<f64>,
@@ -103,9 +108,9 @@ impl Figures {
         let plain = without_signal(spec, bank.latency)?;
         let band = FigureBand::new(spec, &plain);
         let tones = ToneResponse::new(&bank.filters, plain.clone(), Deviations::of_spec(spec))?;
-        let Worst { image, gain_error, vanishes } = tones.worst(band.cycles(spec));
+        let Worst { image, image_at_worst, gain_error, vanishes } = tones.worst(band.cycles(spec));
         let setting = Setting::new(spec, bank.latency)?;
-        let ways = simple::ways(setting.problem());
+        let ways = simple::usual_ways(bank, spec, setting.problem(), band.cycles(spec))?;
         let ratios = setting.ratios(&ways);
         let own = setting.ratio_of_bank(bank)?;
         Ok(Self {
@@ -113,6 +118,7 @@ impl Figures {
             snr: own.snr,
             snr_16_bits_db: own.with_16_bits,
             image: image.map(|tone| ToneFigure::new(spec, &tone, tone.image)),
+            image_at_worst: image_at_worst.map(|tone| ToneFigure::new(spec, &tone, tone.image_at_worst)),
             gain_error: gain_error.map(|tone| ToneFigure::new(spec, &tone, tone.gain_error)),
             target_vanishes: vanishes,
             simple: simple::figures(&ways, &ratios),

@@ -51,8 +51,7 @@ impl Conditions {
     pub(super) fn powers(&self, ways: &[Reconstruction]) -> Vec<Powers> {
         let problem = self.signal.problem();
         let size = problem.ratio * problem.channels.len();
-        let lags =
-            |way: &Reconstruction| if let Reconstruction::Bank(filters) = way { filters.lags() } else { 1 };
+        let lags = |way: &Reconstruction| way.filters().map_or(1, |filters| filters.lags());
         let work: usize = ways.iter().map(|way| size * (lags(way) + self.signal.columns())).sum();
         let breaks =
             even_and(self.signal.breaks().into_iter().chain(ways.iter().flat_map(Reconstruction::breaks)));

@@ -1,6 +1,7 @@
 //! Ways from slow samples to fast ones as the matrix F(theta) of their polyphase components: the filters of
 //! a bank, and the simple ways.
 
+use super::correction::Correction;
 use super::spline::Spline;
 use crate::design::filters::FilterResponse;
 use crate::design::{AliasColumns, NearestSample, Problem, nearest_samples};
@@ -13,6 +14,10 @@ pub(super) enum Reconstruction {
     Bank(FilterResponse),
     /// Each output sample is the slow sample nearest to its instant.
     Interleaving(Vec<NearestSample>),
+    /// The same after each channel's own correction.
+    Corrected(Correction),
+    /// Taps of least mean-square error.
+    LeastSquares(FilterResponse),
     /// The cubic spline through all slow samples.
     Spline(Spline),
     /// The Wiener filter of one converter: the least mean-square error with samples of all time.
@@ -36,16 +41,25 @@ impl Reconstruction {
     /// F at the angle theta, M x N, for a signal with `columns` there and the noise powers `noise`.
     pub(super) fn at(&self, theta: f64, columns: &AliasColumns, noise: &[f64]) -> CMat {
         match self {
-            Self::Bank(filters) => filters.at(theta),
+            Self::Bank(filters) | Self::LeastSquares(filters) => filters.at(theta),
+            Self::Corrected(correction) => correction.at(theta),
             Self::Interleaving(nearest) => interleaved(nearest, noise.len(), theta),
             Self::Spline(spline) => spline.at(theta),
             Self::OneChannel { samples, .. } => wiener(columns, noise, samples.clone()),
         }
     }
 
+    /// The filters, where these are all there is.
+    pub(super) fn filters(&self) -> Option<&FilterResponse> {
+        match self {
+            Self::Bank(filters) | Self::LeastSquares(filters) => Some(filters),
+            _ => None,
+        }
+    }
+
     /// Angles between which F is smooth, or where it has narrow peaks.
     pub(super) fn breaks(&self) -> Vec<f64> {
-        if let Self::Bank(filters) = self { filters.breaks() } else { Vec::new() }
+        self.filters().map_or_else(Vec::new, FilterResponse::breaks)
     }
 
     /// Whether an error of a delay or a gain counts: they are relative to other channels.

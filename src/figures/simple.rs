@@ -1,13 +1,23 @@
-//! The simple ways that a bank must beat, and whether one channel alone does as well as all of them.
+//! The usual ways beside a bank, and whether one channel alone does as well as all of them.
 
 use super::LEAST_GAIN;
+use super::correction::Correction;
 use super::reconstruction::Reconstruction;
 use super::snr::{Ratios, Setting};
 use super::spline::Spline;
-use crate::design::{DesignError, Problem};
-use crate::spec::Spec;
-use crate::units::Decibels;
+use crate::bank::{Bank, SynthesisFilters};
+use crate::design::filters::FilterResponse;
+use crate::design::{DesignError, Problem, least_squares_taps};
+use crate::spec::{Method, Spec};
+use crate::units::{CyclesPerFastPeriod, Decibels};
 use std::ops::Range;
+
+/// The end of the widest band in which a spline through converters in turn is tried: 0.7 of half the output
+/// rate. Beyond it nobody would.
+const WIDEST_OF_A_SPLINE: CyclesPerFastPeriod = CyclesPerFastPeriod(0.35);
+
+/// Most samples of all channels that least-squares taps see here: a design of some seconds.
+const MOST_SAMPLES_SEEN: usize = 512;
 
 /// Channels that are tried alone, at most: one of each kind of front end, gain, noise and rate.
 const MOST_ALONE: usize = 8;
@@ -22,8 +32,13 @@ pub enum SimpleWay {
     /// Each output sample is the slow sample nearest to its instant; with as many channels as the ratio
     /// only.
     Interleaving,
-    /// The cubic spline through all slow samples at their instants.
+    /// The same after each channel's own correction of its gain, offset and skew with 32 taps.
+    OwnCorrection,
+    /// The cubic spline through all slow samples at their instants; not for converters in turn whose signal
+    /// comes near half the output rate.
     CubicSpline,
+    /// FIR filters of least mean-square error, as long as the bank's.
+    LeastSquares,
 }
 
 /// What a simple way gives.
@@ -47,6 +62,39 @@ pub(super) fn ways(problem: &Problem) -> Vec<Reconstruction> {
     Reconstruction::interleaving(problem).into_iter().chain([spline]).chain(alone).collect()
 }
 
+/// The usual ways beside `bank`: all simple ways, each channel's own correction for signals in a band, and
+/// least-squares taps.
+///
+/// # Errors
+/// As [`crate::design::Problem::new`].
+pub(super) fn usual_ways(
+    bank: &Bank,
+    spec: &Spec,
+    problem: &Problem,
+    band: [CyclesPerFastPeriod; 2],
+) -> Result<Vec<Reconstruction>, DesignError> {
+    let mut all = ways(problem);
+    if let Some(correction) = Correction::new(problem, band) {
+        let is_splined = spec.signal.is_none() || band[1] <= WIDEST_OF_A_SPLINE;
+        all.retain(|way| is_splined || !matches!(way, Reconstruction::Spline(_)));
+        all.push(Reconstruction::Corrected(correction));
+    }
+    all.extend(least_squares(bank, spec)?);
+    Ok(all)
+}
+
+/// Taps of least mean-square error for exact channels, as many as the taps of the bank; `None` where the bank
+/// has them, has no taps, or has very many.
+fn least_squares(bank: &Bank, spec: &Spec) -> Result<Option<Reconstruction>, DesignError> {
+    let SynthesisFilters::Fir(own) = &bank.filters else { return Ok(None) };
+    let taps = own.first().map_or(0, Vec::len);
+    if bank.method == Method::H2 || own.len() * taps.div_ceil(bank.ratio) > MOST_SAMPLES_SEEN {
+        return Ok(None);
+    }
+    let best = SynthesisFilters::Fir(least_squares_taps(spec, bank.latency, taps)?);
+    Ok(Some(Reconstruction::LeastSquares(FilterResponse::new(&best, bank.ratio)?)))
+}
+
 /// The first channel of each kind: a delay does not change what a channel gives alone. None where there is
 /// one channel only: that is the bank.
 pub(super) fn kinds(problem: &Problem) -> Vec<(usize, Range<usize>)> {
@@ -65,19 +113,23 @@ pub(super) fn kinds(problem: &Problem) -> Vec<(usize, Range<usize>)> {
     kinds
 }
 
-/// The figures of the simple ways among `ways`, the best one first, and of single channels only the best.
+/// The figures of the usual ways among `ways`, the best simple one first, and of single channels only the
+/// best; least-squares taps, which are a bank too, come last.
 pub(super) fn figures(ways: &[Reconstruction], ratios: &[Ratios]) -> Vec<SimpleFigure> {
     let named = |(way, ratios): (&Reconstruction, &Ratios)| {
         let (way, channel) = match way {
             Reconstruction::Bank(_) => return None,
             Reconstruction::Interleaving(_) => (SimpleWay::Interleaving, None),
             Reconstruction::Spline(_) => (SimpleWay::CubicSpline, None),
+            Reconstruction::Corrected(_) => (SimpleWay::OwnCorrection, None),
+            Reconstruction::LeastSquares(_) => (SimpleWay::LeastSquares, None),
             Reconstruction::OneChannel { converter, .. } => (SimpleWay::OneChannel, Some(converter + 1)),
         };
         Some(SimpleFigure { way, channel, snr_db: ratios.with_noise() })
     };
     let mut found: Vec<SimpleFigure> = ways.iter().zip(ratios).filter_map(named).collect();
-    found.sort_by(|a, b| b.snr_db.0.total_cmp(&a.snr_db.0));
+    let is_bank = |figure: &SimpleFigure| figure.way == SimpleWay::LeastSquares;
+    found.sort_by(|a, b| is_bank(a).cmp(&is_bank(b)).then(b.snr_db.0.total_cmp(&a.snr_db.0)));
     let mut alone = 0;
     found.retain(|figure| {
         alone += usize::from(figure.way == SimpleWay::OneChannel);

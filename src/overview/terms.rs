@@ -2,7 +2,8 @@
 
 use super::text::frequency;
 use crate::figures::{
-    BandSource, FigureBand, Figures, KeyFigures, Setup, SimpleFigure, SimpleWay, Snr, ToneFigure,
+    BandSource, FigureBand, Figures, KeyFigures, NoiseSources, Setup, SimpleFigure, SimpleWay, Snr,
+    ToneFigure,
 };
 use crate::spec::Method;
 use crate::units::{Decibels, Hertz};
@@ -70,13 +71,27 @@ fn signed(db: Decibels) -> String {
     if text.starts_with('-') || text == "0.0 dB" { text } else { format!("+{text}") }
 }
 
+/// The converters' noise with what it is made of.
+fn noise_of(NoiseSources { bits, noise, jitter }: NoiseSources) -> String {
+    let parts: Vec<&str> = [("bits", bits), ("noise", noise), ("jitter", jitter)]
+        .into_iter()
+        .filter_map(|(part, is_stated)| is_stated.then_some(part))
+        .collect();
+    match parts[..] {
+        [] => "the converters' noise".to_owned(),
+        _ => format!("the converters' noise ({})", parts.join(", ")),
+    }
+}
+
 /// The way in words. No filter of one channel, however long, is better than what stands for one channel.
 fn named(figure: &SimpleFigure) -> String {
     match (figure.way, figure.channel) {
         (SimpleWay::OneChannel, Some(channel)) => format!("channel {channel} alone at best"),
         (SimpleWay::OneChannel, None) => "one channel alone at best".to_owned(),
         (SimpleWay::Interleaving, _) => "plain interleaving".to_owned(),
+        (SimpleWay::OwnCorrection, _) => "each channel corrected by itself with 32 taps".to_owned(),
         (SimpleWay::CubicSpline, _) => "a cubic spline".to_owned(),
+        (SimpleWay::LeastSquares, _) => "least-squares taps of this length".to_owned(),
     }
 }
 
@@ -110,8 +125,9 @@ impl FigureTerms<'_> {
                 "for white noise at all frequencies: the spec does not say where the signal lies".to_owned()
             }
         };
+        let noise = noise_of(setup.noise);
         let parts: Vec<String> = [
-            ("the converters' noise", noise_db),
+            (&*noise, noise_db),
             ("uncertain delays", delays_db),
             ("uncertain gains", gains_db),
             ("uncertain offsets", offsets_db),
@@ -146,8 +162,19 @@ impl FigureTerms<'_> {
             (Some(_), Setup { ratio: 1, .. }) => {
                 fact("SFDR", "none", "channels at the output rate have no images")
             }
-            (figure, _) => self.tone("SFDR", figure, "to the largest image of a tone"),
+            (figure, _) => {
+                let fact = self.tone("SFDR", figure, "to the largest image of a tone");
+                Fact { meaning: fact.meaning + &self.at_worst(), ..fact }
+            }
         }
+    }
+
+    /// The SFDR at worst over the box of the spec's `[uncertainty]`.
+    fn at_worst(&self) -> String {
+        let worst = |ToneFigure { db, hertz }| {
+            format!("; at worst over the box of [uncertainty] {}, at {}", rounded(-db), self.hertz(hertz))
+        };
+        self.figures.image_at_worst.map_or_else(String::new, worst)
     }
 
     fn tone(&self, name: &'static str, figure: Option<ToneFigure>, what: &str) -> Fact {
@@ -237,6 +264,7 @@ mod tests {
             snr: snr(total),
             snr_16_bits_db: Some(Decibels(total.min(89.04))),
             image: Some(ToneFigure { db: Decibels(-98.76), hertz: Hertz(8.5e3) }),
+            image_at_worst: None,
             gain_error: Some(ToneFigure { db: Decibels(f64::NEG_INFINITY), hertz: Hertz(0.0) }),
             target_vanishes: false,
             simple: vec![
@@ -249,6 +277,7 @@ mod tests {
                 is_recursive: false,
                 ratio: 2,
                 channels: 2,
+                noise: NoiseSources::default(),
                 has_uncertain_cutoffs: false,
             },
         }

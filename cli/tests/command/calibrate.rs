@@ -175,6 +175,25 @@ fn held_out_captures_and_one_file_of_all_converters_are_checked() {
     );
 }
 
+/// The taps of least squares are the default of converters that take turns, and what a circuit takes.
+#[test]
+fn a_calibrated_spec_without_a_design_makes_least_squares_taps() {
+    let (open, mut dice) = (NOMINAL.replace("[design]\nmethod = \"iir\"\n", ""), Random(3));
+    let desk = Desk::with_spec(&open);
+    write_codes(&desk, "z.txt", &captured(&[161.3e6], 0.9, 8192, &mut dice));
+    let codes = ["z.txt", "--interleaved", "4", "--full-scale", "12bits", "-o", "m.toml"];
+    desk.report(&[&["calibrate", "spec.toml"], &codes[..]].concat());
+    let text = String::from_utf8(desk.read("m.toml")).unwrap();
+    assert!(text.contains("# the second one") && text.contains("method = \"h2\""), "{text}");
+    let report = desk.report(&["design", "m.toml", "-o", "bank.json", "--bits", "14", "--no-proof"]);
+    assert!(report["method"] == "h2" && report["taps"].is_number(), "{report}");
+    desk.good(&["export", "bank.json", "-o", "core.v", "--input-bits", "12"]);
+    // What the spec asks for stays.
+    desk.write("spec.toml", NOMINAL);
+    desk.report(&[&["calibrate", "spec.toml"], &codes[..]].concat());
+    assert!(String::from_utf8(desk.read("m.toml")).unwrap().contains("method = \"iir\""));
+}
+
 /// One file in which the converters take turns, as their codes, one per line.
 fn write_codes(desk: &Desk, name: &str, channels: &[Vec<f32>]) {
     let turns = (0..4 * channels[0].len()).map(|n| f64::from(channels[n % 4][n / 4]) / STEP);

@@ -93,9 +93,9 @@ const KEYS: [Key; 9] = {
         Key { name: "target_snr_db", methods: &[Fir, H2], advised: "fir or h2" },
         Key { name: "target_sfdr_db", methods: &[Fir, H2], advised: "fir or h2" },
         Key { name: "gamma_margin", methods: &[Fir, Iir], advised: "fir or iir" },
-        Key { name: "bits", methods: &[Fir], advised: "fir" },
-        Key { name: "fraction_bits", methods: &[Fir], advised: "fir" },
-        Key { name: "loss_db", methods: &[Fir], advised: "fir" },
+        Key { name: "bits", methods: &[Fir, H2, Sinc, Separation], advised: "fir or h2" },
+        Key { name: "fraction_bits", methods: &[Fir, H2, Sinc, Separation], advised: "fir or h2" },
+        Key { name: "loss_db", methods: &[Fir, H2, Sinc, Separation], advised: "fir or h2" },
         Key { name: "order", methods: &[Iir, H2], advised: "iir or h2" },
         Key { name: "reduction_loss_db", methods: &[Iir, H2], advised: "iir or h2" },
     ]
@@ -282,11 +282,18 @@ impl DesignSpec {
     ) -> Result<(), SpecError> {
         let averages =
             self.method == Method::H2 && uncertainty.is_some_and(|table| table.has_delays_or_gains(channels));
-        match ["order", "reduction_loss_db"].into_iter().find(|key| averages && self.gives(key)) {
-            Some(first) => {
-                let remedy = "h2 averages over uncertain delays and gains with FIR filters, which have no order; leave out one of the two";
-                let second = "[uncertainty]";
-                Err(Refusal::new(first, SpecProblem::Conflict { first, second, remedy }))
+        if let Some(first) =
+            ["order", "reduction_loss_db"].into_iter().find(|key| averages && self.gives(key))
+        {
+            let remedy = "h2 averages over uncertain delays and gains with FIR filters, which have no order; leave out one of the two";
+            let second = "[uncertainty]";
+            return Err(Refusal::new(first, SpecProblem::Conflict { first, second, remedy }));
+        }
+        let is_recursive = !averages && !self.is_fir();
+        match ["bits", "loss_db"].into_iter().find(|key| is_recursive && self.gives(key)) {
+            Some(key) => {
+                let (method, remedy) = ("h2 without taps", "h2 with taps");
+                Err(Refusal::new(key, SpecProblem::NeedlessKey { key, method, remedy }))
             }
             None => Ok(()),
         }
@@ -295,13 +302,14 @@ impl DesignSpec {
 
 impl DesignOverrides {
     /// Values of the command line take precedence. Keys of the file that a new method does not read are
-    /// dropped; taps too if the new method is recursive without them.
+    /// dropped; taps and their bits too if the new method is recursive without taps.
     pub(super) fn over(self, file: Self) -> Self {
         let new = self.method.filter(|method| file.method != Some(*method));
         let keeps = |key: &str| new.is_none_or(|method| method.reads(key));
         let keeps_taps = new.is_none_or(Method::has_taps);
         let is_sized = self.is_sized();
         let keeps_size = |key: &str| keeps(key) && !is_sized;
+        let keeps_words = |key: &str| keeps(key) && (keeps_taps || is_sized);
         Self {
             method: self.method.or(file.method),
             // Each stands in place of the other.
@@ -311,9 +319,9 @@ impl DesignOverrides {
                 .target_sfdr_db
                 .or(file.target_sfdr_db.filter(|_| keeps_size("target_sfdr_db"))),
             gamma_margin: self.gamma_margin.or(file.gamma_margin.filter(|_| keeps("gamma_margin"))),
-            bits: self.bits.or(file.bits.filter(|_| keeps("bits"))),
-            fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| keeps("fraction_bits"))),
-            loss_db: self.loss_db.or(file.loss_db.filter(|_| keeps("loss_db"))),
+            bits: self.bits.or(file.bits.filter(|_| keeps_words("bits"))),
+            fraction_bits: self.fraction_bits.or(file.fraction_bits.filter(|_| keeps_words("fraction_bits"))),
+            loss_db: self.loss_db.or(file.loss_db.filter(|_| keeps_words("loss_db"))),
             order: self.order.or(file.order.filter(|_| keeps("order") && self.reduction_loss_db.is_none())),
             reduction_loss_db: self
                 .reduction_loss_db

@@ -13,8 +13,8 @@ use crate::units::{Decibels, Seconds};
 const DELAY_ROUNDING: f64 = 1e-12;
 
 impl Spec {
-    /// The text of a spec file with the delays, gains, offsets and filters of the channels, the latency and
-    /// the uncertainty of this spec, whose measured filters are those of `models`. Everything else of `text`
+    /// The text of a spec file with the delays, gains, offsets and filters of the channels, the latency, the
+    /// method and the uncertainty of this spec, whose measured filters are those of `models`. Everything else of `text`
     /// is kept as it is, measurements by their files. Delays have the unit that the file gives them.
     ///
     /// Where the text cannot be edited (it describes another spec, or writes channels in an unusual way),
@@ -65,6 +65,10 @@ impl Spec {
         let mut document: DocumentMut = text.parse().ok()?;
         if let Some(latency) = self.latency {
             set(document.as_table_mut(), "latency", i64::try_from(latency).ok()?.into());
+        }
+        if self.design.method != old.design.method {
+            let table = document.entry("design").or_insert(Item::Table(Table::new()));
+            set(table.as_table_like_mut()?, "method", self.design.method.name().into());
         }
         let tables = tables_in(document.get_mut("channel")?);
         if tables.len() != self.channels.len() || old.channels.len() != self.channels.len() {
@@ -125,6 +129,13 @@ impl UncertaintySpec {
             }
         }
     }
+}
+
+/// Whether the text of a spec file leaves the design to the defaults; the noise of the converters is none of it.
+pub fn leaves_the_design_open(text: &str) -> bool {
+    let Ok(document) = text.parse::<DocumentMut>() else { return false };
+    let table = document.get("design").and_then(Item::as_table_like);
+    table.is_none_or(|table| table.iter().all(|(key, _)| key == "noise"))
 }
 
 /// The text of a spec file with the names of measurements as `renamed` says; as it is where it says nothing,

@@ -25,7 +25,7 @@ mod word_lengths;
 
 pub use crate::messages::Location;
 pub use design::{DesignOverrides, DesignSpec, DesignTable, Method, Reduction};
-pub use edit::with_measurements_renamed;
+pub use edit::{leaves_the_design_open, with_measurements_renamed};
 pub use error::{At, refused};
 pub use error::{Refusal, SpecError, SpecProblem};
 pub use error_box::{ConverterErrors, ErrorBox, ErrorPoint};

@@ -15,7 +15,7 @@ pub(crate) mod fir;
 mod gamma_iteration;
 pub(crate) mod h2;
 pub(crate) mod iir;
-mod mean_square_fir;
+pub(crate) mod mean_square_fir;
 mod precise_filtering;
 pub(crate) mod robust_fir;
 

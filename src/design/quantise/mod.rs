@@ -1,5 +1,6 @@
 //! Taps for fixed-point hardware: integers times a power of two, chosen for the least gamma instead of the
-//! least distance from the optimal taps.
+//! least distance from the optimal taps. Those of `h2` are chosen for the least mean-square error, by the
+//! first of the stages alone.
 //!
 //! Rounding each tap by itself wastes gamma, because noise in the taps matters only where the channels carry
 //! signal. The search (`search`) has two stages:
@@ -104,7 +105,7 @@ pub(super) fn quantise(
     let mut found = quantiser.quantise_all(&all, fraction_bits)?;
     // Integers that fit few bits fit more bits.
     for k in 1..found.len() {
-        if found[k - 1].is_better(&found[k], problem.gamma_margin) {
+        if found[k - 1].is_better(&found[k], problem) {
             let fixed_point = FixedPoint { bits: all[k].clone(), ..found[k - 1].fixed_point.clone() };
             found[k] = RoundedTaps { fixed_point, ..found[k - 1] };
         }

@@ -14,6 +14,7 @@ use crate::design::DesignError;
 use crate::design::error_grid::ErrorGrid;
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
+use crate::design::reduction::Aim;
 use crate::linalg::{self, CMat, Complex, Mat};
 use crate::lmi::sampled::FrequencyPoint;
 use crate::lti::FirMatrix;
@@ -30,6 +31,8 @@ pub(in crate::design) struct QuantisationProblem<'a> {
     pub(in crate::design) noise: &'a [f64],
     /// Relative excess of gamma granted to the mean square.
     pub(in crate::design) gamma_margin: f64,
+    /// What the taps minimise, and the integers too.
+    pub(in crate::design) aim: Aim,
     /// Ends the search with the best integers so far.
     pub(in crate::design) stop: &'a Stop,
 }
@@ -98,9 +101,25 @@ impl<'a> TapError<'a> {
     pub(super) fn candidate(&self, fixed_point: FixedPoint) -> Result<RoundedTaps, DesignError> {
         let taps = fixed_point.taps();
         let fir = FirMatrix::polyphase(&taps, self.ratio);
-        let found = self.grid.mean_square(&fir) + output_noise(self.problem.noise, &taps);
+        let found = match self.problem.aim {
+            Aim::WorstCase => self.grid.mean_square(&fir) + output_noise(self.problem.noise, &taps),
+            Aim::MeanSquare => self.real_mean_square + self.added(&taps),
+        };
         let mean_square = found.max(self.least_mean_square);
         Ok(RoundedTaps { gamma: self.grid.gamma(&fir)?, mean_square, fixed_point })
+    }
+
+    /// The mean square that taps in place of the real ones add where these have the least one: the form of
+    /// the change alone.
+    fn added(&self, taps: &[Vec<f64>]) -> f64 {
+        let differ = |(new, old): (&Vec<f64>, &Vec<f64>)| new.iter().zip(old).map(|(x, y)| x - y).collect();
+        let change: Vec<Vec<f64>> = taps.iter().zip(self.problem.taps).map(differ).collect();
+        let fir = FirMatrix::polyphase(&change, self.ratio);
+        let square = |(point, weight): (&FrequencyPoint, f64)| {
+            weight * (fir.response(point.omega) * &point.h).norm_squared()
+        };
+        let signal: f64 = self.points.iter().zip(self.grid.mean_weights()).map(square).sum();
+        signal + output_noise(self.problem.noise, &change)
     }
 
     /// The mean square that a unit of each channel's tap adds.
@@ -109,11 +128,15 @@ impl<'a> TapError<'a> {
         (0..self.problem.taps.len()).map(|i| correlations.power(i) + noise(self.problem.noise, i)).collect()
     }
 
-    /// The real taps of least mean square of the error plus the converters' noise at the output.
+    /// The real taps of least mean square of the error plus the converters' noise at the output: the taps of
+    /// the problem where they minimise that, over uncertain channels too.
     ///
     /// # Errors
     /// [`DesignError::Linalg`] if rounding errors make the form indefinite.
     pub(super) fn taps_of_least_square(&self) -> Result<Vec<Vec<f64>>, DesignError> {
+        if self.problem.aim == Aim::MeanSquare {
+            return Ok(self.problem.taps.to_vec());
+        }
         let (problem, weights) = (self.problem, self.grid.mean_weights());
         let fir = FirMatrix::polyphase(problem.taps, self.ratio);
         let errors = self.points.iter().map(|point| point.error(&fir.response(point.omega)));

@@ -7,12 +7,18 @@ use super::settings::SETTINGS;
 use super::{WordLoss, decades};
 use crate::bank::FixedPoint;
 use crate::design::DesignError;
+use crate::design::reduction::Aim;
 use crate::spec::{MAX_FRACTION_BITS, WordLengths};
 use rayon::prelude::*;
 
 impl RoundedTaps {
-    /// Whether gamma is smaller, or about equal with a smaller mean square.
-    pub(super) fn is_better(&self, other: &Self, gamma_margin: f64) -> bool {
+    /// Whether gamma is smaller, or about equal with a smaller mean square; only the mean square counts
+    /// where that is the aim.
+    pub(super) fn is_better(&self, other: &Self, problem: QuantisationProblem<'_>) -> bool {
+        let QuantisationProblem { aim, gamma_margin, .. } = problem;
+        if aim == Aim::MeanSquare {
+            return self.mean_square < other.mean_square;
+        }
         let alike = 1.0 + gamma_margin.max(SETTINGS.gamma_tie);
         self.gamma * alike < other.gamma
             || self.gamma < other.gamma * alike && self.mean_square < other.mean_square
@@ -34,7 +40,10 @@ impl<'a> TapQuantiser<'a> {
     /// # Errors
     /// [`DesignError::Lti`] if the plant is not stable, [`DesignError::Linalg`] if a decomposition fails.
     pub(super) fn new(problem: QuantisationProblem<'a>) -> Result<Self, DesignError> {
-        Ok(Self { error: TapError::new(problem)?, most_mean_square: f64::INFINITY, of_least_square: None })
+        let error = TapError::new(problem)?;
+        let is_least_square = problem.aim == Aim::MeanSquare;
+        let of_least_square = is_least_square.then(|| error.taps_of_least_square()).transpose()?;
+        Ok(Self { error, most_mean_square: f64::INFINITY, of_least_square })
     }
 
     /// The same for integers whose mean square is at most `loss_db` above that of the real taps.
@@ -69,7 +78,10 @@ impl<'a> TapQuantiser<'a> {
 
     fn candidates(&self, bits: &WordLengths, fraction_bits: i32) -> Result<Vec<RoundedTaps>, DesignError> {
         let search = LatticeSearch::new(&self.error, bits, fraction_bits);
-        let mut found = search.run()?;
+        let mut found = match self.error.problem.aim {
+            Aim::WorstCase => search.run()?,
+            Aim::MeanSquare => vec![self.error.candidate(search.rounded())?],
+        };
         if let Some(taps) = &self.of_least_square {
             found.push(search.near_least_square(taps)?);
         }
@@ -79,7 +91,8 @@ impl<'a> TapQuantiser<'a> {
     /// The candidate of least mean square: of those of about the least gamma, which is not above that of
     /// zero output, that keep to the mean square that is allowed, or of all where none does.
     fn best(&self, mut found: Vec<RoundedTaps>, of_zero_output: f64) -> Option<RoundedTaps> {
-        if found.iter().any(|found| self.keeps(found)) {
+        let gamma_counts = self.error.problem.aim == Aim::WorstCase;
+        if gamma_counts && found.iter().any(|found| self.keeps(found)) {
             found.retain(|found| self.keeps(found));
             let least = found.iter().map(|found| found.gamma).fold(f64::INFINITY, f64::min);
             let alike = least * (1.0 + self.error.problem.gamma_margin.max(SETTINGS.gamma_tie));
@@ -104,11 +117,17 @@ impl<'a> TapQuantiser<'a> {
     /// # Errors
     /// [`DesignError::Linalg`] if a decomposition fails.
     pub(super) fn does_nothing(&self, found: &RoundedTaps) -> Result<bool, DesignError> {
-        let fixed_point = &found.fixed_point;
+        let (fixed_point, error) = (&found.fixed_point, &self.error);
         let zeros = fixed_point.integers.iter().map(|list| vec![0; list.len()]).collect();
-        let zero_output = self.error.gamma(&FixedPoint { integers: zeros, ..fixed_point.clone() })?;
-        Ok(found.gamma >= zero_output * (1.0 - SETTINGS.least_effect_of_integers)
-            && self.error.real_gamma < zero_output * (1.0 - SETTINGS.least_effect_of_real_taps))
+        let zero_output = error.candidate(FixedPoint { integers: zeros, ..fixed_point.clone() })?;
+        let (integers, real, zero_output) = match error.problem.aim {
+            Aim::WorstCase => (found.gamma, error.real_gamma, zero_output.gamma),
+            Aim::MeanSquare => {
+                (found.mean_square.sqrt(), error.real_mean_square.sqrt(), zero_output.mean_square.sqrt())
+            }
+        };
+        Ok(integers >= zero_output * (1.0 - SETTINGS.least_effect_of_integers)
+            && real < zero_output * (1.0 - SETTINGS.least_effect_of_real_taps))
     }
 
     /// Whether the mean square is as small as it should be.

@@ -133,3 +133,21 @@ fn wishes_that_make_no_sense_are_refused() {
     desk.write("bad.toml", TWELVE_BITS.replace("taps = 24", "taps = 24, loss_db = 0.1, fraction_bits = 3"));
     desk.refused(1, &["design", "bad.toml", "-o", "no.json"], &["bad.toml:", "the loss decides"]);
 }
+
+/// Their mean square grows with the bits that are taken away, and a rounded tap is no part of the aim.
+#[test]
+fn least_squares_taps_are_integers_too() {
+    let desk = Desk::with_spec(THESIS);
+    let design = |name: &str, flags: &[&str]| {
+        let own =
+            ["design", "spec.toml", "-o", name, "--json", "--method", "h2", "--taps", "22", "--no-proof"];
+        desk.json(&[&own[..], flags].concat())
+    };
+    let rms = |report: &Value| number(report, "/rms_error");
+    let real = rms(&design("real.json", &[]));
+    let [few, many] = ["8", "14"].map(|bits| rms(&design(&format!("{bits}.json"), &["--bits", bits])));
+    assert!(real < many && many < few && many < 1.01 * real, "{real} {many} {few}");
+    let chosen = design("loss.json", &["--loss-db", "0.1"]);
+    assert!(rms(&chosen) / real < 10_f64.powf(0.1 / 20.0) * (1.0 + 1e-3), "{chosen}");
+    desk.good(&["export", "8.json", "-o", "core.v", "--input-bits", "12"]);
+}

@@ -28,8 +28,8 @@ fn what_is_wrong_with_a_flag_names_the_flag() {
         (
             "spec.toml",
             &["--bits", "8", "--method", "h2"],
-            "--bits: bits has no meaning for the method h2",
-            "fir",
+            "--bits: bits has no meaning for the method h2 without taps",
+            "h2 with taps",
         ),
         ("iir.toml", &["--snr", "90"], "--snr: target_snr_db has no meaning for the method iir", "fir or h2"),
         ("spec.toml", &["--snr=-1"], "--snr: -1 dB", "0 to 300 dB"),
