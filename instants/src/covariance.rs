@@ -129,7 +129,7 @@ fn sums(terms: &[Term], first: f64, step: f64, count: usize) -> Vec<f64> {
         let phasor = |row: usize, begin: usize| {
             let Term { frequency, amplitude } = terms[row / 2];
             let phasor = amplitude * Complex::from_polar(1.0, TAU * frequency * begins[begin]);
-            if row % 2 == 0 { phasor.re } else { phasor.im }
+            if row.is_multiple_of(2) { phasor.re } else { phasor.im }
         };
         values.gemm(1.0, &turns, &Mat::from_fn(2 * terms.len(), begins.len(), phasor), 1.0);
     }

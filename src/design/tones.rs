@@ -213,8 +213,8 @@ impl ToneResponse {
 /// Directions in the plane in which the largest image is sought: its size is right to 0.1 %.
 const DIRECTIONS: usize = 64;
 
-/// The largest |M Y_k| within the half-widths of the uncertain converters, whose own parts of it are given. A
-/// late sample is turned by -j w, one of a larger gain is longer; the part of each error in a direction is
+/// The largest |M Y_k| within the half-widths of the uncertain converters, whose own parts of it are given.
+/// A late sample is turned by -j w, one of a larger gain is longer; the part of each error in a direction is
 /// largest at one end of its interval.
 fn largest_within(
     exact: Complex<f64>,

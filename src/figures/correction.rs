@@ -1,9 +1,9 @@
 //! What each channel can do for itself: its own gain and its own skew are taken from its samples, and the
 //! other channels count as exact.
 //!
-//! The samples in turn are taken for uniform ones. A filter of [`TAPS`] of them, one for each channel, moves a
-//! sample by the skew of its channel. It is the best one in the band, so what is left of an image is of second
-//! order in the skews: the neighbours that the filter uses have skews too.
+//! The samples in turn are taken for uniform ones. A filter of [`TAPS`] of them, one for each channel, moves
+//! a sample by the skew of its channel. It is the best one in the band, so what is left of an image is of
+//! second order in the skews: the neighbours that the filter uses have skews too.
 
 use crate::design::{Problem, nearest_samples};
 use crate::linalg::{self, CMat, Complex, Mat};

@@ -83,8 +83,8 @@ pub(super) fn usual_ways(
     Ok(all)
 }
 
-/// Taps of least mean-square error for exact channels, as many as the taps of the bank; `None` where the bank
-/// has them, has no taps, or has very many.
+/// Taps of least mean-square error for exact channels, as many as the taps of the bank; `None` where the
+/// bank has them, has no taps, or has very many.
 fn least_squares(bank: &Bank, spec: &Spec) -> Result<Option<Reconstruction>, DesignError> {
     let SynthesisFilters::Fir(own) = &bank.filters else { return Ok(None) };
     let taps = own.first().map_or(0, Vec::len);

@@ -14,8 +14,9 @@ const DELAY_ROUNDING: f64 = 1e-12;
 
 impl Spec {
     /// The text of a spec file with the delays, gains, offsets and filters of the channels, the latency, the
-    /// method and the uncertainty of this spec, whose measured filters are those of `models`. Everything else of `text`
-    /// is kept as it is, measurements by their files. Delays have the unit that the file gives them.
+    /// method and the uncertainty of this spec, whose measured filters are those of `models`. Everything
+    /// else of `text` is kept as it is, measurements by their files. Delays have the unit that the file
+    /// gives them.
     ///
     /// Where the text cannot be edited (it describes another spec, or writes channels in an unusual way),
     /// the whole spec is rewritten.
@@ -131,7 +132,8 @@ impl UncertaintySpec {
     }
 }
 
-/// Whether the text of a spec file leaves the design to the defaults; the noise of the converters is none of it.
+/// Whether the text of a spec file leaves the design to the defaults; the noise of the converters is none of
+/// it.
 pub fn leaves_the_design_open(text: &str) -> bool {
     let Ok(document) = text.parse::<DocumentMut>() else { return false };
     let table = document.get("design").and_then(Item::as_table_like);
