@@ -130,9 +130,6 @@ pub fn fuse_stamped(
         Clock::stamps(&instants).map_err(|problem| MergeError::Stamps { name, problem })
     };
     let clocks: Vec<Clock> = stamps.iter().enumerate().map(clock).collect::<Result<_, _>>()?;
-    for (i, (clock, samples)) in clocks.iter().zip(channels).enumerate() {
-        check_rate(bank, i, clock, samples.len())?;
-    }
     let last = |(clock, samples): (&Clock, &Vec<f64>)| clock.at(samples.len().saturating_sub(1) as f64).0;
     let begin = clocks.iter().map(|clock| clock.at(0.0).0).fold(0.0, f64::max).ceil();
     let end = clocks.iter().zip(channels).map(last).fold(f64::INFINITY, f64::min).floor();
@@ -140,6 +137,9 @@ pub fn fuse_stamped(
     if end < begin {
         let seconds = bank.fast_period.0 * (end - begin).max(0.0);
         return Err(MergeError::Overlap { seconds, samples: longest });
+    }
+    for (i, (clock, samples)) in clocks.iter().zip(channels).enumerate() {
+        check_rate(bank, i, clock, samples.len())?;
     }
     let count = (end - begin) as usize + 1;
     let settings = FusionSettings { first: FastPeriods(begin), count, reach: REACH };

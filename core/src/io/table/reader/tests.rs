@@ -457,7 +457,7 @@ fn what_is_no_number_is_answered_with_how_to_write_it() {
         ("-0.5 V,0.25 V", "\"-0.5 V\": write units into the heading"),
         ("0x1f3,0x200", "\"0x1f3\": write codes as decimal numbers"),
     ] {
-        let refused = refusal(&format!("time,a\n{line}\n{line}\n"));
+        let refused = refusal(format!("time,a\n{line}\n{line}\n"));
         assert!(refused.contains(remedy), "{refused}");
     }
     let later = refusal("a,b\n0.5,0.25\n0.5 mV,0.25\n");
