@@ -221,8 +221,8 @@ fn half_widths<T: Default>(
 fn raise(spec: &mut Spec, h: Seconds) -> Option<usize> {
     let least = spec.channels.iter().map(|channel| channel.delay / h).fold(0.0, f64::min);
     let periods = (-least).ceil() as usize;
-    // Later delays leave less to wait for in a frame.
-    let before = spec.wait();
+    // Later delays leave less to wait for in a frame. The latency of before knows of no negative delay.
+    let before = if spec.layout().is_plain() { 0 } else { spec.wait() };
     spec.channels.iter_mut().for_each(|channel| channel.delay += h * periods as f64);
     let waited = spec.wait() + periods;
     spec.latency = spec.latency.map(|latency| (latency + waited).saturating_sub(before));

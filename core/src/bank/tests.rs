@@ -381,9 +381,10 @@ proptest! {
         let offsets = taps.iter().map(|list| list[2] % 1.0).collect();
         let gamma = Gamma { upper: gamma, ..Gamma::default() };
         let samples = vec![1; taps.len()];
+        let nonlinearity = taps.iter().map(|list| vec![list[3] % 0.1; list[4].to_bits() as usize % 3]).collect();
         let filters = SynthesisFilters::Fir(taps.clone());
         let fast_period = Seconds(fast_period);
-        let converters = Bank { delays, gains, offsets, samples, ..fir() };
+        let converters = Bank { delays, gains, offsets, nonlinearity, samples, ..fir() };
         let bank = Bank { spec: None, fast_period, latency, filters, gamma, ..converters };
         let back = Bank::from_json(&bank.to_json().unwrap(), "b.json").unwrap();
         let SynthesisFilters::Fir(read) = &back.filters else { panic!("taps expected") };

@@ -11,6 +11,8 @@ const LOOKED_AT: usize = 1 << 18;
 const SAME: f64 = 1.0 / 65536.0;
 /// So many times as often as a sine with the same step below its top does a clipped signal reach its top.
 const FACTOR: f64 = 2.0;
+/// A step or a pulse comes to its top once and stays.
+const FEW_VISITS: usize = 8;
 /// As many samples may be there by chance in a short recording.
 const FEW: f64 = 64.0;
 
@@ -20,21 +22,27 @@ struct Top {
     level: f64,
     count: usize,
     next: f64,
+    /// How often the signal came there, and whether it is there.
+    visits: usize,
+    is_there: bool,
 }
 
 impl Top {
-    const NONE: Self = Self { level: 0.0, count: 0, next: f64::NEG_INFINITY };
+    const NONE: Self = Self { level: 0.0, count: 0, next: f64::NEG_INFINITY, visits: 0, is_there: false };
 
     fn take(&mut self, x: f64) {
         let same = SAME * self.level.abs();
         if self.count == 0 && x.is_finite() {
-            *self = Self { level: x, count: 1, ..Self::NONE };
+            *self = Self { level: x, count: 1, visits: 1, is_there: true, ..Self::NONE };
         } else if x > self.level + same {
-            *self = Self { level: x, count: 1, next: self.level };
+            *self = Self { level: x, count: 1, next: self.level, visits: 1, is_there: true };
         } else if x >= self.level - same {
             self.count += 1;
-        } else if x > self.next {
-            self.next = x;
+            self.visits += usize::from(!self.is_there);
+            self.is_there = true;
+        } else {
+            self.next = if x > self.next { x } else { self.next };
+            self.is_there = false;
         }
     }
 
@@ -43,7 +51,9 @@ impl Top {
     fn is_flat(&self, amplitude: f64, of: usize) -> bool {
         let step = (self.level - self.next).max(SAME * amplitude);
         let of_sine = (2.0 * step / amplitude).sqrt() / PI;
-        self.level != 0.0 && self.count as f64 > (FACTOR * of_sine * of as f64).max(FEW)
+        self.level != 0.0
+            && self.visits >= FEW_VISITS
+            && self.count as f64 > (FACTOR * of_sine * of as f64).max(FEW)
     }
 }
 
@@ -151,6 +161,7 @@ mod tests {
         let pulses = (0..20_000).map(|k| if k % 20 < 10 { 0.0 } else { 1e-3 * f64::from(k % 7) });
         assert_eq!((level(square), level(pulses)), (None, None));
         assert_eq!(level(std::iter::repeat_n(0.25, 20_000)), None);
+        assert_eq!(level((0..20_000).map(|k| 1.0 - 0.99_f64.powi(k))), None);
         assert_eq!(level([f64::NAN; 1000].into_iter()), None);
     }
 }

@@ -21,7 +21,7 @@ fn refused(text: &str, line: usize, words: &str) {
 fn an_unknown_key_is_named_with_line_neighbour_and_all_known_keys() {
     let text = message(&thesis_with("delay = 1.2", "dealy = 1.2"));
     let expected = "spec.toml:11:1: channel 1: unknown key \"dealy\", did you mean \"delay\"?; the keys here are delay, \
-                    delay_samples, rate, filter, noise, bits, jitter, gain, offset\n   |\n11 | dealy = 1.2\n   | ^^^^^";
+                    delay_samples, rate, filter, noise, bits, jitter, gain, offset, nonlinearity\n   |\n11 | dealy = 1.2\n   | ^^^^^";
     assert_eq!(text, expected);
 }
 

@@ -83,7 +83,8 @@ prop_compose! {
         });
         let moves = uncertainty.as_ref().is_some_and(|table| table.delays(channels.len()).iter().any(|d| d.0 > 0.0));
         let is_sized = method.has_taps() || (method == Method::H2 && order.is_none() && loss.is_none());
-        let by_loss = method.reads("loss_db") && fraction_bits.is_none() && ratio % 2 == 0;
+        let is_fir = method != Method::H2 || is_sized;
+        let by_loss = method.reads("loss_db") && is_fir && fraction_bits.is_none() && ratio % 2 == 0;
         let is_reduced = method.reads("order") && !(method == Method::H2 && moves);
         let by_snr = method.reads("target_snr_db") && ratio % 3 == 0;
         Spec {
@@ -98,8 +99,8 @@ prop_compose! {
                 taps: (is_sized && !by_snr).then_some(taps),
                 target_snr_db: (is_sized && by_snr).then_some(taps as f64 / 1000.0),
                 gamma_margin: gamma_margin.filter(|_| method.reads("gamma_margin")),
-                bits: bits.clone().filter(|_| method.reads("bits")),
-                fraction_bits: fraction_bits.filter(|_| method.reads("bits") && bits.is_some()),
+                bits: bits.clone().filter(|_| method.reads("bits") && is_fir),
+                fraction_bits: fraction_bits.filter(|_| method.reads("bits") && is_fir && bits.is_some()),
                 loss_db: by_loss.then_some(0.25),
                 order: order.filter(|_| is_reduced),
                 reduction_loss_db: loss.filter(|_| is_reduced && order.is_none()),
