@@ -102,7 +102,7 @@ mod tests {
                 let w = TAU * (band[0] + part * (band[1] - band[0]));
                 let terms = shifts().zip(&weights).map(|(l, c)| Complex::from_polar(*c, w * l as f64));
                 let error = terms.sum::<Complex<f64>>() - Complex::from_polar(1.0, w * skew);
-                assert!(error.norm() < 5e-3 * skew.abs() + 0.2 * RIDGE.sqrt(), "{skew} {part}: {error}");
+                assert!(error.norm() < 5e-3 * skew.abs() + RIDGE.sqrt(), "{skew} {part}: {error}");
             }
         }
     }
