@@ -206,7 +206,7 @@ fn designed(args: &Args, spec: &Spec) -> Result<Design, Failure> {
     let watch = DesignWatch {
         stop: Stop::default(),
         interrupts: interrupts(),
-        farewell: "interrupted: the design ends with the best bank so far",
+        at_interrupt: "interrupted: the design ends with the best bank so far",
         limit: time_limit.map(|limit| limit + PATIENCE),
         give_up: &|| give_up(&args.spec, spec),
         stage: Mutex::default(),

@@ -21,7 +21,7 @@ pub(super) struct DesignWatch<'a> {
     pub(super) stop: Stop,
     pub(super) interrupts: Receiver<()>,
     /// What is said at an interrupt.
-    pub(super) farewell: &'static str,
+    pub(super) at_interrupt: &'static str,
     pub(super) limit: Option<Duration>,
     pub(super) give_up: &'a (dyn Fn() + Sync),
     /// What is done now.
@@ -57,7 +57,7 @@ impl DesignWatch<'_> {
         while done.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
             let elapsed = begin.elapsed();
             if self.interrupts.try_recv().is_ok() {
-                bar.suspend(|| say_line(self.farewell));
+                bar.suspend(|| say_line(self.at_interrupt));
                 self.stop.now();
             }
             if self.limit.is_some_and(|limit| elapsed > limit) {
@@ -94,7 +94,7 @@ mod tests {
         DesignWatch {
             stop: Stop::default(),
             interrupts: crossbeam_channel::never(),
-            farewell: "interrupted",
+            at_interrupt: "interrupted",
             limit,
             give_up,
             stage: Mutex::default(),

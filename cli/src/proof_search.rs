@@ -51,7 +51,7 @@ pub(super) enum SearchCut {
     OutOfTime(Duration),
     /// It was interrupted.
     Interrupted,
-    /// Nobody wants a proof.
+    /// No proof is wanted.
     NotWanted,
 }
 
@@ -89,7 +89,7 @@ pub(super) fn proved(design: Design, limit: ProofLimit) -> Result<Searched, Fail
     let watch = DesignWatch {
         stop: Stop::default(),
         interrupts: interrupts(),
-        farewell: "interrupted: the search for the proof ends",
+        at_interrupt: "interrupted: the search for the proof ends",
         limit: None,
         give_up: &|| (),
         stage: Mutex::new(Some(Stage::Proof)),
@@ -104,7 +104,7 @@ fn search(mut design: Design) -> Result<Receiver<Design>, Failure> {
     let (sender, results) = unbounded();
     let work = move || {
         design.prove(&Stop::default(), &|proven| {
-            // Nobody waits any more.
+            // The search was given up.
             let _ = sender.send(proven.clone());
         });
     };

@@ -1,6 +1,6 @@
 """SFDR of four interleaved converters of 500 MS/s, 14 bits and 0.1 ps of jitter: the samples as they come, each
 converter corrected by itself, the bank that hybank makes of the calibrated spec without any option, and
-least-squares taps from the true errors, which nobody knows.
+least-squares taps from the true errors, which a user cannot know.
 
     python examples/interleaved_sfdr/sfdr.py [FOLDER]      needs numpy, and `hybank` in PATH
 """

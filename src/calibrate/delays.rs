@@ -75,7 +75,7 @@ pub(super) fn delays_told(spec: &Spec, model: &ChannelModel, records: &[Record])
     }
     let fit = FittedValues { offset: false, ..FittedValues::default() };
     let Ok(fitted) = blind.fit(CalibrationSettings { fit, reference }) else {
-        return Delays { are_told: blind.tells_delays(SHARP_SIGMA), ..Delays::default() };
+        return Delays { are_told: blind.determines_delays(SHARP_SIGMA), ..Delays::default() };
     };
     let (nominal, found) = blind.unexplained(&fitted.point);
     let fits = fitted.misfit.is_none_or(|misfit| misfit <= WORST_MISFIT);

@@ -6,7 +6,7 @@ use super::warning::CalibrationWarning;
 use crate::linalg::Mat;
 use crate::sine_fit::Estimate;
 use crate::spec::{Cutoff, HALF_WIDTH, OneOrEach, Spec, UncertaintySpec};
-use crate::units::{FastPeriods, Hertz, Seconds};
+use crate::units::{FastPeriods, Hertz};
 
 /// Largest condition of an information matrix with unit diagonal. Beyond it two parameters have the same
 /// effect to five digits, and the fit follows the noise.
@@ -200,7 +200,7 @@ pub fn applied(spec: &Spec, calibration: &Calibration) -> (Spec, Vec<Calibration
         }),
         reference: Some(calibration.reference + 1),
     });
-    let warnings = raise(&mut new, h).map(|periods| CalibrationWarning::Shifted { periods });
+    let warnings = raise(&mut new, spec.wait()).map(|periods| CalibrationWarning::Shifted { periods });
     (new, warnings.into_iter().collect())
 }
 
@@ -217,12 +217,12 @@ fn half_widths<T: Default>(
     Some(OneOrEach::Each(found.into_iter().map(Option::unwrap_or_default).collect()))
 }
 
-/// Adds the whole fast periods that make all delays positive, if there must be any.
-fn raise(spec: &mut Spec, h: Seconds) -> Option<usize> {
+/// Adds the whole fast periods that make all delays positive, if there must be any, also to the latency,
+/// which included the wait for a frame of `before`.
+fn raise(spec: &mut Spec, before: usize) -> Option<usize> {
+    let h = spec.fast_period;
     let least = spec.channels.iter().map(|channel| channel.delay / h).fold(0.0, f64::min);
     let periods = (-least).ceil() as usize;
-    // Later delays leave less to wait for in a frame. The latency of before knows of no negative delay.
-    let before = if spec.layout().is_plain() { 0 } else { spec.wait() };
     spec.channels.iter_mut().for_each(|channel| channel.delay += h * periods as f64);
     let waited = spec.wait() + periods;
     spec.latency = spec.latency.map(|latency| (latency + waited).saturating_sub(before));

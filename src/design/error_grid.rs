@@ -24,7 +24,7 @@ pub(super) struct Settings {
     /// their errors are the same.
     pub(super) least_share: f64,
     /// Frequencies closer than this are one point, in radians: rows of the problem that differ by rounding
-    /// help nobody.
+    /// do not help.
     pub(super) least_distance: f64,
 }
 

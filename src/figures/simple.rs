@@ -13,7 +13,7 @@ use crate::units::{CyclesPerFastPeriod, Decibels};
 use std::ops::Range;
 
 /// The end of the widest band in which a spline through converters in turn is tried: 0.7 of half the output
-/// rate. Beyond it nobody would.
+/// rate. Beyond it none is drawn.
 const WIDEST_OF_A_SPLINE: CyclesPerFastPeriod = CyclesPerFastPeriod(0.35);
 
 /// Most samples of all channels that least-squares taps see here: a design of some seconds.

@@ -277,7 +277,7 @@ fn one_channel_is_not_compared_with_itself() {
 }
 
 /// Skews of a hundredth of a sample: plain interleaving errs by w s, each channel's own correction by its
-/// square and less, and least squares by neither. Nobody draws a spline there.
+/// square and less, and least squares by neither. No spline is drawn there.
 #[test]
 fn own_corrections_leave_what_is_of_second_order() {
     let delays = &[3.01, 1.992, 1.009, 0.0];

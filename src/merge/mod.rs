@@ -12,7 +12,7 @@ mod tracked;
 
 pub use course::PredictedQuality;
 pub use error::{MergeError, MergeWarning};
-pub use tracked::{DelayTrack, Tracked, TrackedFusion, fuse_stamped, fuse_tracked};
+pub use tracked::{DelayTrack, Tracked, TrackedFusion, fuse_stamped};
 
 use crate::align::ClockStep;
 use crate::calibrate::Record;

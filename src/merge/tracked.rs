@@ -96,20 +96,6 @@ impl TrackedFusion {
     }
 }
 
-/// Fuses whole recordings as [`TrackedFusion`] does.
-///
-/// # Errors
-/// As [`TrackedFusion::new`] and [`TrackedFusion::finish`].
-pub fn fuse_tracked(bank: &Bank, channels: &[Vec<f64>], track: &DelayTrack) -> Result<Tracked, MergeError> {
-    let mut fusion = TrackedFusion::new(bank, track)?;
-    let count = channels.iter().map(Vec::len).min().unwrap_or(0);
-    let common: Vec<Vec<f64>> = channels.iter().map(|samples| samples[..count].to_vec()).collect();
-    let mut samples = fusion.push(&common)?;
-    let (last, quality) = fusion.finish()?;
-    samples.extend(last);
-    Ok(Tracked { samples, begin: Seconds(0.0), quality })
-}
-
 /// Fuses the recordings of the converters of a bank, each sample of which has its time stamp; NaN where
 /// samples were lost. Front ends, band and noise are those of the bank's spec, its delays are not used. The
 /// outputs lie on fast periods after the first stamp of the first converter, as far as all converters reach.
@@ -195,6 +181,15 @@ mod tests {
         [signal]\nband = 18000\n[[channel]]\ndelay = 0\nbits = 16\n\
         [[channel]]\ndelay = \"0.9 samples\"\ngain = -0.6\nbits = 16\n\
         [design]\nmethod = \"h2\"\ntaps = 48\n";
+
+    /// Whole recordings at once.
+    fn fuse_tracked(bank: &Bank, channels: &[Vec<f64>], track: &DelayTrack) -> Result<Tracked, MergeError> {
+        let mut fusion = TrackedFusion::new(bank, track)?;
+        let mut samples = fusion.push(channels)?;
+        let (last, quality) = fusion.finish()?;
+        samples.extend(last);
+        Ok(Tracked { samples, begin: Seconds(0.0), quality })
+    }
 
     fn bank() -> Bank {
         let spec = Spec::from_toml(SPEC, "test").unwrap();

@@ -21,7 +21,7 @@ const UNUSED_BITS: u32 = 3;
 const ENOUGH_CODES: u64 = 256;
 /// So many times as often as a sine of full scale does a signal that is clipped reach the ends of the range.
 const CLIPPED_FACTOR: f64 = 2.0;
-/// And so many times as often as in a beginning in which few levels explain that it is there.
+/// And so many times as often as a tone that is there often because it has few levels.
 const CHANCE: f64 = 1.5;
 /// As many samples may be there by chance in a short recording.
 const FEW_AT_RAILS: f64 = 16.0;
@@ -295,10 +295,10 @@ impl Scaling {
         let beyond =
             (is_float && peak > self.usual_peak).then_some(InputFault::BeyondFullScale { peak, likely });
         let Seen { count, at_rails, .. } = self.seen;
-        let clipped = self.rails.is_some_and(|(_, highest)| {
+        let clipped = self.rails.is_some_and(|rails| {
             // A sine of full scale is within half a step of an end of the range for this share of the time.
-            let of_sine = FRAC_2_PI * (1.0 - highest).sqrt();
-            let share = (CLIPPED_FACTOR * of_sine).max(CHANCE * self.flat_tops.share_of_few_levels());
+            let of_sine = FRAC_2_PI * (1.0 - rails.1).sqrt();
+            let share = (CLIPPED_FACTOR * of_sine).max(CHANCE * self.flat_tops.share_at_rails(rails));
             let by_chance = (share * count as f64).max(FEW_AT_RAILS);
             peak <= 1.0 && at_rails as f64 > by_chance
         });
@@ -448,6 +448,17 @@ mod tests {
         for period in [2, 4, 8, 12, 16, 20] {
             assert_eq!(tone(period, 32767.0), [], "{period}");
         }
+        // A quiet tone of few levels in one channel says nothing of another one.
+        let quiet = |k: usize| [0, 11_585, 16_384, 11_585, 0, -11_585, -16_384, -11_585][k % 8];
+        let loud = |k: usize| (4e4 * (0.1 * k as f64).sin()).clamp(-32768.0, 32767.0) as i16;
+        let two = StreamHeader::real(SampleLayout::packed(PcmFormat::S16Le), 2);
+        let mut block = Block::default();
+        block.begin(&two);
+        let bytes = words(&(0..8000).flat_map(|k| [quiet(k), loud(k)]).collect::<Vec<_>>());
+        block.decode(&PcmFrames { layout: two.layout, channels: 2, bytes: &bytes }).unwrap();
+        let mut scaling = Scaling::new(&two, StatedScale::default()).unwrap();
+        scaling.take(&mut block, 0).unwrap();
+        assert!(matches!(scaling.faults().collect::<Vec<_>>()[..], [InputFault::AtRails { .. }]));
         assert!(matches!(tone(97, 60_000.0)[..], [InputFault::AtRails { of: 8000, .. }]));
         // Most of its steps are at the rails: none is by chance.
         assert!(matches!(tone(64, 1e5)[..], [InputFault::AtRails { .. }]));

@@ -90,7 +90,7 @@ impl MultiReader {
             && !sources.iter().any(InputSource::is_table)
         {
             let problem =
-                "it is no table, so options of tables (columns, delimiters, lines to skip) do not apply";
+                "it is no table, so leave out the options of tables (columns, delimiters, lines to skip)";
             return Err(IoError::unfit(&first.name())(problem.into()));
         }
         // All threads first: opening a FIFO waits for its writer, in whatever order they come.

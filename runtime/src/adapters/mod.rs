@@ -39,7 +39,7 @@ pub trait FrameSource: Sync {
         None
     }
 
-    /// True if no sample of some frames is NaN or infinite; false where nobody looks.
+    /// True if no sample of some frames is NaN or infinite; false where that is not looked at.
     fn is_finite(&self, _frames: Range<usize>) -> bool {
         false
     }

@@ -252,7 +252,7 @@ impl<'a> Blind<'a> {
 
     /// True if bands of one alias agree with the nominal delays, and would not if any of these were wrong by
     /// `moved` fast periods. The likelihood of a signal with next to no noise has no maximum that is found.
-    pub(super) fn tells_delays(&self, moved: f64) -> bool {
+    pub(super) fn determines_delays(&self, moved: f64) -> bool {
         let nominal = self.nominal();
         let power: f64 = self.bands(&nominal.delays, FIRST_LEAST).iter().map(|used| used.band.power()).sum();
         let left = self.left_at(&nominal);

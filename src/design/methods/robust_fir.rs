@@ -23,7 +23,7 @@ use crate::units::Seconds;
 
 /// What a robust design tolerates.
 struct Settings {
-    /// A nominal bank whose largest gain is within this of a lower bound is kept: nobody sees 0.01 dB.
+    /// A nominal bank whose largest gain is within this of a lower bound is kept: 0.01 dB does not matter.
     no_gain: f64,
     /// Relative width of the interval of the worst norm over the scenarios: 0.001 dB, as each round costs a
     /// search of the box.

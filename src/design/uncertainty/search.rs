@@ -20,7 +20,7 @@ use std::cell::OnceCell;
 
 /// What the search of a box tolerates.
 struct Settings {
-    /// A step that raises the gain by less (relative) ends the climb: what is left of it is rounding.
+    /// A step that raises the gain by less (relative) ends the ascent: what is left of it is rounding.
     least_step: f64,
     /// Relative change of a gain at which the refinement of a peak ends: a hundredth of the accuracy of a
     /// robust norm.
@@ -33,12 +33,11 @@ struct Settings {
 /// Of every search.
 const SETTINGS: Settings = Settings { least_step: 1e-9, flat_gain: 1e-6, near_worst: 0.9 };
 
-/// Steps of a climb; two or three suffice.
+/// Steps of an ascent; two or three suffice.
 const MAX_STEPS: usize = 16;
 /// Combinations that are carried from one frequency to the next.
 const CARRIED: usize = 3;
-/// Peaks that are followed between the nodes, and the share of the largest that they have at least. Robust
-/// banks have many that are nearly equal.
+/// Peaks that are followed between the nodes.
 const FOLLOWED: usize = 6;
 /// Halvings of the distance of the nodes while a peak is followed, from a quarter of the half-width: a gain
 /// is flat at its peak.
@@ -156,7 +155,7 @@ impl BoxSearch {
             let at = filters.at(self.frequencies.all[k]);
             let mut starts = self.worst_corners(self.response(k), &at)?;
             starts.append(&mut carried);
-            all[k] = self.climbed(starts, k, &at)?;
+            all[k] = self.ascended(starts, k, &at)?;
             carried = combinations(&all[k]);
         }
         for pair in self.frequencies.first.windows(2) {
@@ -165,7 +164,7 @@ impl BoxSearch {
                 let starts = [combinations(low), combinations(high)].concat();
                 let between = pair[0] + 1..pair[1];
                 for (k, found) in between.clone().zip(&mut all[between]) {
-                    *found = self.climbed(starts.clone(), k, &filters.at(self.frequencies.all[k]))?;
+                    *found = self.ascended(starts.clone(), k, &filters.at(self.frequencies.all[k]))?;
                 }
             }
         }
@@ -182,8 +181,8 @@ impl BoxSearch {
         Ok(combinations(&corners))
     }
 
-    /// Where the climbs from `starts` end, the worst first.
-    fn climbed(
+    /// Where the ascents from `starts` end, the worst first.
+    fn ascended(
         &self,
         starts: Vec<Combination>,
         k: usize,
@@ -191,7 +190,7 @@ impl BoxSearch {
     ) -> Result<Vec<Attained>, DesignError> {
         let mut all: Vec<Attained> = Vec::new();
         for start in starts {
-            let found = climb(&self.plant, self.response(k), filters, start)?;
+            let found = ascend(&self.plant, self.response(k), filters, start)?;
             if all.iter().all(|known| known.combination != found.combination) {
                 all.push(found);
             }
@@ -224,7 +223,7 @@ impl BoxSearch {
             }
             starts.push(combination);
         }
-        self.climbed(starts, k, &at)
+        self.ascended(starts, k, &at)
     }
 
     /// The gain of one combination.
@@ -287,7 +286,7 @@ impl BoxSearch {
         let at = filters.at(frequency);
         for halving in 2..2 + HALVINGS {
             let near = self.plant.near(&point, 0.5f64.powi(halving));
-            let found = climb(&near, &near.response(frequency), &at, vec![0; point.delays.len()])?;
+            let found = ascend(&near, &near.response(frequency), &at, vec![0; point.delays.len()])?;
             point = near.point(&found.combination);
         }
         Ok(point)
@@ -295,7 +294,7 @@ impl BoxSearch {
 }
 
 /// A combination of locally largest gain, from `combination` on.
-fn climb(
+fn ascend(
     plant: &BoxPlant,
     response: &BoxResponse,
     filters: &CMat,

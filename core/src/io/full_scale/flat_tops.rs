@@ -82,15 +82,17 @@ impl FlatTops {
         });
     }
 
-    /// The largest share of a channel's samples at tops that are not flat: a tone that repeats after few
-    /// samples has few levels, and is at the largest one often.
-    pub(super) fn share_of_few_levels(&self) -> f64 {
-        let shares = self.tops.iter().map(|[high, low]| {
+    /// The share of all samples that is at the rails in channels that are not flat there: a tone that repeats
+    /// after few samples has few levels, and is at the largest one often.
+    pub(super) fn share_at_rails(&self, rails: (f64, f64)) -> f64 {
+        let counts = self.tops.iter().map(|[high, low]| {
             let amplitude = 0.5 * (high.level + low.level);
-            let plain = [high, low].into_iter().filter(|top| !top.is_flat(amplitude, self.frames));
-            plain.map(|top| top.count).sum::<usize>() as f64 / self.frames.max(1) as f64
+            let is_plain = |top: &Top| !top.is_flat(amplitude, self.frames);
+            let high = Some(high).filter(|top| top.level >= rails.1 && is_plain(top));
+            let low = Some(low).filter(|top| -top.level <= rails.0 && is_plain(top));
+            high.into_iter().chain(low).map(|top| top.count).sum::<usize>()
         });
-        shares.fold(0.0, f64::max)
+        counts.sum::<usize>() as f64 / (self.frames * self.tops.len()).max(1) as f64
     }
 
     /// The first channel that is clipped within the rails.
@@ -142,7 +144,7 @@ mod tests {
         assert_eq!(level(sine(0.1).map(|x| x.max(-0.3))), Some(-0.3));
         assert_eq!(level(rounded(sine(0.1).map(|x| x.min(0.6999)), 32768.0)), Some(22934.0 / 32768.0));
         assert_eq!(level(rounded(sine(0.1).map(|x| x.clamp(-0.3, 0.3)), 2048.0)), Some(614.0 / 2048.0));
-        // Those at the rails are told by the rails.
+        // At the rails it is another fault.
         assert_eq!(level(sine(0.1).map(|x| (2.0 * x).clamp(-1.0, 1.0))), None);
     }
 

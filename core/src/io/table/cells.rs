@@ -134,7 +134,9 @@ pub(super) fn remedy(cell: &str) -> Option<&'static str> {
     let number = cell[..cell.len() - letters.len()].trim_end();
     if cell.strip_prefix("0x").or(cell.strip_prefix("0X")).is_some_and(is_of_digits) {
         Some("write codes as decimal numbers")
-    } else if cell.contains(':') || ['/', '.', '-'].iter().any(|mark| cell.matches(*mark).count() > 1) {
+    } else if cell.starts_with(|c: char| c.is_ascii_digit())
+        && (cell.contains(':') || ['/', '.', '-'].iter().any(|mark| cell.matches(*mark).count() > 1))
+    {
         Some(AS_TIME)
     } else {
         (!letters.is_empty() && parse(number).is_some_and(f64::is_finite))

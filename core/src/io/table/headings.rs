@@ -232,9 +232,10 @@ fn stated(text: &str, next: Option<&str>, is_rate: bool) -> Option<StatedRate> {
     let text = text.trim().replace(',', ".");
     let number = text.trim_end_matches(|c: char| !c.is_ascii_digit() && c != '.');
     let value = if is_rate {
-        let unit = next.filter(|_| number == text).unwrap_or_default();
-        let text = format!("{text} {unit}").replace("Sa/s", "S/s");
-        quantity::rate(text.trim()).or_else(|_| quantity::rate(number)).ok()?.0
+        // What follows a plain number is its unit, or another number.
+        let with_unit = next.filter(|_| number == text).map(|unit| format!("{text} {unit}"));
+        let rate = |text: &str| quantity::rate(text.replace("Sa/s", "S/s").trim()).ok();
+        with_unit.and_then(|text| rate(&text)).or_else(|| rate(&text))?.0
     } else {
         let Ok(WrittenTime::Seconds(time)) = quantity::time(&text) else { return None };
         time.0
@@ -327,12 +328,15 @@ mod tests {
             ("Increment (ms),2.5", 400.0),
             ("Sample Rate [kHz],24", 24e3),
             ("Sample Rate,24 kSa/s", 24e3),
+            ("Sample Rate,24000,24000", 24e3),
             ("Sampling Rate = 48 kS/s", 48e3),
         ] {
             let found = rate(text).unwrap();
             assert!((found.hertz / hertz - 1.0).abs() < 1e-12, "{text} {found:?}");
         }
-        for text in ["Sample Interval,auto", "Sample rate:", "interval,-1", "CH1,0.5", ""] {
+        for text in
+            ["Sample Rate,24 kilo", "Sample Interval,auto", "Sample rate:", "interval,-1", "CH1,0.5", ""]
+        {
             assert_eq!(rate(text), None, "{text}");
         }
         let rounded = rate("Interval,4.167e-05").unwrap();

@@ -151,11 +151,7 @@ impl<R: Read> Table<R> {
         if !is_closed {
             return Err(self.fault("a quote is not closed; cells cannot hold line ends"));
         }
-        if self.preamble.beside > 0 {
-            self.preamble.beside -= 1;
-        } else {
-            self.check_width()?;
-        }
+        self.check_width()?;
         let bare = self.bare.as_mut().and_then(|bare| bare.find(&self.cells));
         bare.map_or(Ok(true), |problem| Err(self.fault(&problem)))
     }

@@ -29,9 +29,7 @@ pub(super) struct Preamble {
     pub(super) layout: Layout,
     /// The first lines of numbers.
     pub(super) ahead: VecDeque<NumberedLine>,
-    /// How many of them have words of the preamble in the columns that hold nothing.
-    pub(super) beside: usize,
-    /// Lines of numbers may have such words.
+    /// Lines of numbers may have words of the preamble in the columns that hold nothing.
     pub(super) is_beside: bool,
     /// Headings, and the cells below them where there is a line of units; as many as the first line of
     /// numbers has cells.
@@ -147,7 +145,7 @@ impl Preamble {
         let words = |line: &[u8]| split(line, delimiter_of_words(line, delimiter));
         let cells: Vec<Vec<String>> = preamble.map(|(_, line)| words(line)).collect();
         let is_beside = beside > 0;
-        Self { layout, ahead, beside, is_beside, names, units, stated: headings::stated_rate(&cells), blank }
+        Self { layout, ahead, is_beside, names, units, stated: headings::stated_rate(&cells), blank }
     }
 }
 

@@ -41,8 +41,8 @@ impl Days {
             self.midnights += 1;
         }
         self.last = Some(stamp);
-        let unit = 10_i64.pow(stamp.exponent.unsigned_abs());
-        Stamp { mantissa: stamp.mantissa + self.midnights * DAY * unit, ..stamp }
+        let days = self.midnights.saturating_mul(DAY * 10_i64.pow(stamp.exponent.unsigned_abs()));
+        Stamp { mantissa: stamp.mantissa.saturating_add(days), ..stamp }
     }
 }
 
@@ -228,6 +228,15 @@ mod tests {
         );
         // A step back stays one, and dates say their day.
         assert_eq!(["00:59:00", "1970-01-01T01:00:00"].map(count), [176_340.0, 3600.0]);
+    }
+
+    /// Each second line of this table seems to be another day: more than nanoseconds of an `i64` can count.
+    #[test]
+    fn any_number_of_midnights_is_counted() {
+        let mut days = Days::default();
+        let stamps = ["23:00:00.000000000", "01:00:00.000000000"].map(|text| Stamp::parse(text).unwrap());
+        let last = (0..300_000).map(|k| days.count(stamps[k % 2]).value()).last();
+        assert!(last.is_some_and(|last| last > 9e9), "{last:?}");
     }
 
     #[test]
