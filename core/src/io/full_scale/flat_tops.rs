@@ -82,8 +82,8 @@ impl FlatTops {
         });
     }
 
-    /// The share of all samples that is at the rails in channels that are not flat there: a tone that repeats
-    /// after few samples has few levels, and is at the largest one often.
+    /// The share of all samples that is at the rails in channels that are not flat there: a tone that
+    /// repeats after few samples has few levels, and is at the largest one often.
     pub(super) fn share_at_rails(&self, rails: (f64, f64)) -> f64 {
         let counts = self.tops.iter().map(|[high, low]| {
             let amplitude = 0.5 * (high.level + low.level);
