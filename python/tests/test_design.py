@@ -130,6 +130,15 @@ def test_errors_of_a_signal_are_those_of_the_library(signal, path, words):
     assert caught.value.path == path
 
 
+def test_negative_delays_count_from_a_period_later():
+    text = TEXT.replace("{", "{{").replace("}", "}}").replace("25 us", "{} samples").replace("12.5 us", "{} samples")
+    with pytest.warns(UserWarning, match="all count as 1 fast period later"):
+        early = hb.design(text.format(0, -0.6))
+    late = hb.design(text.format(1, 0.4))
+    assert early.latency == late.latency == 4
+    assert np.allclose(early.taps, late.taps, rtol=1e-9, atol=1e-12)
+
+
 def test_errors_of_a_text_have_line_caret_and_remedy():
     with pytest.raises(hb.SpecError) as caught:
         hb.design(TEXT.replace("taps", "tabs"))
@@ -146,7 +155,7 @@ def test_errors_of_a_text_have_line_caret_and_remedy():
         ({"ratio": None}, "", "missing"),
         ({"fast_rate": float("inf")}, "fast_rate", "out of range"),
         ({"fast_rate": np.nan}, "fast_rate", "NaN"),
-        ({"channel": [{"delay": -1e-6}]}, "channel[0].delay", "out of range"),
+        ({"channel": [{"delay": np.inf}]}, "channel[0].delay", "out of range"),
         ({"channel": [{"delay": True}]}, "channel[0].delay", "found true"),
         ({"design": {"method": "fur"}}, "design.method", 'did you mean "fir"'),
         ({"target": {"filter": {"num": np.array([1.0]), "den": np.array([1.0])}}}, "target.filter.den", "no pole"),
