@@ -56,10 +56,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "DIR")]
     trim: Option<PathBuf>,
     /// How far apart the recordings began at most, as 50ms or 2s
-    #[arg(long, value_name = "TIME", value_parser = quantity::time)]
+    #[arg(long, value_name = "TIME", value_parser = quantity::time, hide_short_help = true)]
     within: Option<WrittenTime>,
     /// The channel whose clock is the time, from 1 [default: that of the spec's uncertainty table, or 1]
-    #[arg(long, value_name = "I")]
+    #[arg(long, value_name = "I", hide_short_help = true)]
     reference: Option<usize>,
     #[command(flatten)]
     reading: CaptureArgs,

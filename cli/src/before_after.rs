@@ -21,10 +21,10 @@ pub(super) struct BeforeAfterArgs {
     #[arg(long, conflicts_with = "track")]
     measure: bool,
     /// Tones to measure (9kHz, 1.2GHz, or hertz); auto: the largest one
-    #[arg(long, value_name = "F,..", value_delimiter = ',', value_parser = tone, requires = "measure")]
+    #[arg(long, value_name = "F,..", value_delimiter = ',', value_parser = tone, requires = "measure", hide_short_help = true)]
     tone: Vec<ToneArg>,
     /// Write the spectra before and after with their spurs, as SVG
-    #[arg(long, value_name = "OUT.svg", requires = "measure")]
+    #[arg(long, value_name = "OUT.svg", requires = "measure", hide_short_help = true)]
     plot: Option<PathBuf>,
 }
 

@@ -19,10 +19,10 @@ pub(super) struct BitTrueArgs {
     /// Run the integer taps of the bank on the integers of the captures, as hardware and the exported C do:
     /// exact sums, each rounded to the nearest integer, halves upwards, and saturated at the bits of the
     /// captures. The output has their bits
-    #[arg(long, conflicts_with_all = ["gaps", "algorithm", "bits", "threads", "report", "track"])]
+    #[arg(long, conflicts_with_all = ["gaps", "algorithm", "bits", "threads", "report", "track"], hide_short_help = true)]
     bit_true: bool,
     /// Bits of the accumulator with --bit-true; sums that do not fit wrap around
-    #[arg(long, value_name = "BITS", requires = "bit_true", default_value_t = 64, value_parser = clap::value_parser!(u8).range(8..=64))]
+    #[arg(long, value_name = "BITS", requires = "bit_true", default_value_t = 64, value_parser = clap::value_parser!(u8).range(8..=64), hide_short_help = true)]
     accumulator: u8,
 }
 

@@ -74,7 +74,7 @@ pub(super) struct Args {
     blind: bool,
     /// The channel to which the others are relative, from 1 [default: that of the spec's uncertainty table,
     /// or 1]
-    #[arg(long, value_name = "I")]
+    #[arg(long, value_name = "I", hide_short_help = true)]
     reference: Option<usize>,
     /// What to fit: delay, gain, offset, cutoff, or cutoff:2 for the cut-offs of the second stages of the
     /// filters' cascades; the rest keeps the values of the spec [default: `fit` of the spec, or
@@ -95,7 +95,7 @@ pub(super) struct Args {
     interleaved: InterleavedArgs,
     /// Samples of this size and more are clipped and left out [default: the ends of integer formats, 1 for
     /// floats none of which is beyond]
-    #[arg(long, value_name = "LEVEL")]
+    #[arg(long, value_name = "LEVEL", hide_short_help = true)]
     clip: Option<f64>,
     /// Replace an existing output, and write values that the captures contradict
     #[arg(long)]

@@ -16,20 +16,22 @@ use std::path::Path;
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct CaptureArgs {
     /// Sample format of captures: wav, csv, or a raw format as in ffmpeg (s16le, f32le, ..; with c before it
-    /// for complex samples: cf32, cs16). SigMF recordings, .csv, .npy, .mat (x.mat:name for one variable of
-    /// several) and .flac state their own; a text of numbers is a table, whatever its name
+    /// for complex samples: cf32, cs16)
+    ///
+    /// SigMF recordings, .csv, .npy, .mat (x.mat:name for one variable of several) and .flac state their
+    /// own; a text of numbers is a table, whatever its name.
     #[arg(long, value_name = "FORMAT", default_value = "wav", value_parser = coding)]
     format: Coding,
     /// Interleaved channels of each raw capture [default: 1 each, or all in a single capture]
     #[arg(long, value_name = "C", value_parser = clap::value_parser!(u16).range(1..))]
     channels: Option<u16>,
     /// Each pair of channels is a complex sample, as receivers write I and Q to WAV
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     iq: bool,
     #[command(flatten)]
     pub(super) scale: ScaleArgs,
     /// Use only this channel of each capture, from 1
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..), hide_short_help = true)]
     channel: Option<u16>,
     #[command(flatten)]
     pub(super) table: TableArgs,
@@ -112,9 +114,10 @@ pub(super) struct ScaleArgs {
 /// The option of the commands that read captures of a bank.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(super) struct InterleavedArgs {
-    /// The input is one recording of one channel in which M converters take turns: its sample k, counted
-    /// from 0, comes from converter k mod M. Converters count in the order in which they sample, so
-    /// converter 0 is the channel with the largest delay
+    /// The input is one recording of one channel in which M converters take turns
+    ///
+    /// Its sample k, counted from 0, comes from converter k mod M. Converters count in the order in which
+    /// they sample, so converter 0 is the channel with the largest delay.
     #[arg(long, value_name = "M", value_parser = clap::value_parser!(u16).range(1..=1024))]
     interleaved: Option<u16>,
 }

@@ -66,37 +66,37 @@ pub(super) struct Args {
     #[arg(long)]
     latency: Option<usize>,
     /// Share by which gamma may exceed its minimum, for a smaller mean-square error and output noise
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     gamma_margin: Option<f64>,
     /// Integer taps of this many bits, sign included; or a list with the bits of each tap (4,6,8,6,4)
     #[arg(long)]
     bits: Option<WordLengths>,
     /// A tap is its integer times 2^-FRACTION_BITS; chosen for the least gamma if left out
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     fraction_bits: Option<i32>,
     /// Integer taps of the fewest bits (of --bits at most), and of the fewest taps of that length, that
     /// lose at most this many decibels of SNR relative to the real taps
-    #[arg(long, value_name = "DB", conflicts_with = "fraction_bits")]
+    #[arg(long, value_name = "DB", conflicts_with = "fraction_bits", hide_short_help = true)]
     loss_db: Option<f64>,
     /// Use at most this many states (methods iir and h2)
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     order: Option<usize>,
     /// Use the fewest states whose error is at most this many decibels above that of the full bank (methods
     /// iir and h2)
-    #[arg(long, value_name = "DB", conflicts_with = "order")]
+    #[arg(long, value_name = "DB", conflicts_with = "order", hide_short_help = true)]
     reduction_loss_db: Option<f64>,
     /// Design for longer than ten minutes. By default a design ends then, as at the first Ctrl-C, with the
     /// best bank so far
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     no_limit: bool,
     /// Search for the proof until it is found or there is none, however long that takes
-    #[arg(long, conflicts_with = "no_proof")]
+    #[arg(long, conflicts_with = "no_proof", hide_short_help = true)]
     prove: bool,
     /// Do not search for a proof
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     no_proof: bool,
     /// Make every warning about the spec and the bank an error
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     strict: bool,
     /// Replace an existing bank file, and write a bank that is of no use: its gamma above 0.9 of that of
     /// zero output, or less than 10 dB of the signal's SNR

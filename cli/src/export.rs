@@ -47,8 +47,6 @@ pub(super) struct Args {
     /// verilog; there those of the spec's converters if left out)
     #[arg(long, value_name = "B", value_parser = clap::value_parser!(u32).range(2..=32))]
     input_bits: Option<u32>,
-    #[command(flatten)]
-    verilog: VerilogArgs,
     /// Prefix of the C identifiers, or the Verilog module [default: bank; of a module the name of its file]
     #[arg(long)]
     name: Option<String>,
@@ -58,6 +56,8 @@ pub(super) struct Args {
     /// Replace an existing file
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    verilog: VerilogArgs,
 }
 
 impl Args {

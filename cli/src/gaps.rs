@@ -24,20 +24,20 @@ pub(super) struct GapArgs {
     gaps: bool,
     /// Write one byte per output sample: 0 where no missing sample affects it, else its predicted SNR in
     /// whole decibels, from 1 to 255
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
     mask: Option<PathBuf>,
     /// File of JSON lines that name lost samples. {"channel": 1, "sample_start": 5, "global_index": 8}:
     /// sample 5 of the input was number 8 at the converter; the first such line of a channel is about its
     /// sample 0. {"channel": 2, "first": 40, "length": 3}:
     /// samples 40 to 42 are invalid
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
     lost: Option<PathBuf>,
     /// The most frames (one sample of each channel of an input) that an input may leave out in all; more are
     /// an error, because a number is probably wrong [default: 67108864]
-    #[arg(long, value_name = "FRAMES")]
+    #[arg(long, value_name = "FRAMES", hide_short_help = true)]
     max_lost: Option<u64>,
     /// Continue until the last channel ends; the missing ends of the other channels are gaps
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     longest: bool,
 }
 

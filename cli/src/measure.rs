@@ -41,10 +41,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "M", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=1024))]
     interleaved: u16,
     /// Window of the spectrum (SFDR, noise density, plot); SINAD, THD and the spurs need none
-    #[arg(long, value_parser = one_of(WINDOWS), default_value = "bh7")]
+    #[arg(long, value_parser = one_of(WINDOWS), default_value = "bh7", hide_short_help = true)]
     window: Window,
     /// Highest order of the harmonics in THD
-    #[arg(long, value_name = "H", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "H", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1024), hide_short_help = true)]
     harmonics: u16,
     /// A recording of the same signal to compare with, of the same rate; --format and the other options of
     /// the recording hold for it too, unless its name says its format
@@ -57,7 +57,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "F", value_parser = rate)]
     rate: Option<Hertz>,
     /// Samples at either end that are not measured, such as those before a filter has settled
-    #[arg(long, value_name = "SAMPLES", default_value_t = 0)]
+    #[arg(long, value_name = "SAMPLES", default_value_t = 0, hide_short_help = true)]
     skip: usize,
     /// Write the spectrum with its spurs, as SVG
     #[arg(long, value_name = "OUT.svg")]

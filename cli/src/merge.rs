@@ -53,7 +53,7 @@ pub(super) struct Args {
     #[arg(long)]
     flat: bool,
     /// How far apart the recordings began at most, as 50ms or 2s
-    #[arg(long, value_name = "TIME", value_parser = quantity::time)]
+    #[arg(long, value_name = "TIME", value_parser = quantity::time, hide_short_help = true)]
     within: Option<WrittenTime>,
     /// Samples of the WAV file: integers, or floats
     #[arg(long, value_parser = bits(), default_value = "32f")]

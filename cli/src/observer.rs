@@ -27,7 +27,7 @@ const LONG_GAP: f64 = 1000.0;
 pub(super) struct ObserverArgs {
     /// Write what happens as JSON lines while it happens: gaps, clipping, stalls, warnings, and the report
     /// at the end as the last line. A FIFO will do; `-` is standard output
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
     report: Option<PathBuf>,
 }
 

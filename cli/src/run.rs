@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 pub(super) struct RunArgs {
     /// Algorithm of FIR filters; auto is the fastest for the bank, and direct with --gaps and in
     /// `stream`, because overlap-save adds latency (--json says how much)
-    #[arg(long, value_parser = algorithms(), default_value_t = Algorithm::Auto)]
+    #[arg(long, value_parser = algorithms(), default_value_t = Algorithm::Auto, hide_short_help = true)]
     algorithm: Algorithm,
     #[command(flatten)]
     pub(super) interleaved: InterleavedArgs,
@@ -32,13 +32,13 @@ pub(super) struct RunArgs {
     /// Threads that filter (FIR banks only), 0 for one per processor. The result has the same bits with any
     /// number. More than one thread helps with many taps or channels; otherwise reading and writing take
     /// longer than filtering
-    #[arg(long, value_name = "T", default_value_t = 1, value_parser = clap::value_parser!(u16).range(0..=1024))]
+    #[arg(long, value_name = "T", default_value_t = 1, value_parser = clap::value_parser!(u16).range(0..=1024), hide_short_help = true)]
     threads: u16,
     #[command(flatten)]
     pub(super) observer: ObserverArgs,
     /// Make every tolerated fault (unequal lengths, truncation, an incomplete last frame, NaN, clipping) an
     /// error
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     pub(super) strict: bool,
     /// Replace an existing output
     #[arg(long)]

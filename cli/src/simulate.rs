@@ -59,7 +59,7 @@ pub(super) struct Args {
     #[arg(long)]
     samples: Option<usize>,
     /// Factor by which the analog signal is multiplied
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, hide_short_help = true)]
     gain: f64,
     /// Replace existing files
     #[arg(long)]

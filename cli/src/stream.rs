@@ -44,7 +44,7 @@ pub(super) struct Args {
     format: Coding,
     /// Sample format of the output [default: wav for the name x.wav, else that of the input; f32le for
     /// tables]
-    #[arg(long, value_name = "FORMAT", value_parser = output_coding)]
+    #[arg(long, value_name = "FORMAT", value_parser = output_coding, hide_short_help = true)]
     output_format: Option<Coding>,
     #[command(flatten)]
     scale: ScaleArgs,
@@ -65,7 +65,7 @@ pub(super) struct Args {
     #[arg(short, long, default_value = "-")]
     output: PathBuf,
     /// Output the last samples at the end, as many as the latency, with zeros for input
-    #[arg(long, conflicts_with = "track")]
+    #[arg(long, conflicts_with = "track", hide_short_help = true)]
     flush: bool,
     #[command(flatten)]
     track: TrackArgs,

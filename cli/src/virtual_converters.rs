@@ -32,13 +32,19 @@ pub(super) struct ErrorArgs {
     gain_error: Vec<f64>,
     /// Relative errors of the cut-offs of the front ends, as 1% or 0.01, one value for all or one per
     /// channel; of the stage that `fit` of the spec names, if it names one
-    #[arg(long, value_name = "SHARE,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative)]
+    #[arg(long, value_name = "SHARE,..", value_delimiter = ',', allow_hyphen_values = true, value_parser = quantity::relative, hide_short_help = true)]
     cutoff_error: Vec<f64>,
     /// Offsets relative to full scale, added to those of the spec, one value for all or one per channel
-    #[arg(long, value_name = "O,..", value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "O,..",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        hide_short_help = true
+    )]
     offset: Vec<f64>,
     /// Seed of noise and jitter; the same seed gives the same samples
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_short_help = true)]
     seed: u64,
 }
 

@@ -16,10 +16,10 @@ pub(super) struct SignalArgs {
     #[arg(long)]
     source: String,
     /// The imaginary part of a complex signal: a real source or FILE.wav
-    #[arg(long, value_name = "SOURCE")]
+    #[arg(long, value_name = "SOURCE", hide_short_help = true)]
     imaginary: Option<String>,
     /// Channel of each WAV recording, counted from 1; a mono recording needs none
-    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u16).range(1..), hide_short_help = true)]
     channel: Option<u16>,
 }
 
