@@ -162,11 +162,14 @@ impl ChannelSpec {
         x - hybank_runtime::nonlinearity(&self.nonlinearity, x)
     }
 
-    /// Rms of the noise and of the rounding together, relative to full scale: a step of 2^(1 - bits) is an
-    /// error of step / sqrt(12).
+    /// Rms of the noise and of the rounding together, relative to full scale.
     pub fn sample_noise(&self) -> f64 {
-        let rounding = self.bits.map_or(0.0, |bits| 2f64.powi(1 - bits as i32) / 12f64.sqrt());
-        self.noise.hypot(rounding)
+        self.noise.hypot(self.rounding())
+    }
+
+    /// Rms of the rounding: a step of 2^(1 - bits) is an error of step / sqrt(12).
+    pub fn rounding(&self) -> f64 {
+        self.bits.map_or(0.0, |bits| 2f64.powi(1 - bits as i32) / 12f64.sqrt())
     }
 }
 
