@@ -36,12 +36,33 @@ pub enum ExportError {
         /// At most so many.
         most: u32,
     },
-    /// The bank corrects a nonlinearity, for which no format has a place.
+    /// The bank corrects a nonlinearity, for which the format has no place.
     #[error(
-        "channel {channel} has a nonlinearity, which only `fuse`, `stream`, Python and the C library correct; take it \
-         out of the spec, design the bank again, and correct the samples before the filters"
+        "channel {channel} has a nonlinearity, which only `fuse`, `stream`, Python, the C library and Verilog correct; \
+         take it out of the spec, design the bank again, and correct the samples before the filters"
     )]
     Nonlinearity {
+        /// Number of the channel, from 1.
+        channel: usize,
+    },
+    /// A table of a nonlinearity would have very many words.
+    #[error(
+        "a nonlinearity is taken out of integers by a table with a word for each code; samples of {bits} bits have too \
+         many, {most} bits are the most. Use fewer bits, or take the nonlinearity out of the spec and correct the \
+         samples before the filters"
+    )]
+    TableBits {
+        /// Bits of the samples.
+        bits: u32,
+        /// Most bits.
+        most: u32,
+    },
+    /// The words that are loaded are taps and offsets.
+    #[error(
+        "a circuit whose taps are loaded has no place for the nonlinearity of channel {channel}; write one with \
+         constant taps, or take the nonlinearity out of the spec and correct the samples before the filters"
+    )]
+    LoadedNonlinearity {
         /// Number of the channel, from 1.
         channel: usize,
     },
@@ -133,8 +154,21 @@ pub enum ExportError {
 
 /// Refuses a bank that corrects nonlinearities.
 pub(super) fn check_straight(bank: &Bank) -> Result<(), ExportError> {
-    match bank.nonlinearity.iter().position(|curve| !curve.is_empty()) {
-        Some(i) => Err(ExportError::Nonlinearity { channel: i + 1 }),
+    match first_curve(bank) {
+        Some(channel) => Err(ExportError::Nonlinearity { channel }),
         None => Ok(()),
     }
+}
+
+/// Refuses it for a circuit whose taps are loaded.
+pub(super) fn check_loadable(bank: &Bank) -> Result<(), ExportError> {
+    match first_curve(bank) {
+        Some(channel) => Err(ExportError::LoadedNonlinearity { channel }),
+        None => Ok(()),
+    }
+}
+
+/// The first channel with a nonlinearity, from 1.
+fn first_curve(bank: &Bank) -> Option<usize> {
+    bank.nonlinearity.iter().position(|curve| !curve.is_empty()).map(|i| i + 1)
 }
