@@ -34,7 +34,7 @@ pub enum CaptureError {
         /// From 1.
         channel: usize,
         /// The rule.
-        problem: SpecProblem,
+        problem: Box<SpecProblem>,
     },
     /// A sample that is no number.
     #[error("sample {sample} is {value}, and all are needed; repair the recording first")]

@@ -95,7 +95,7 @@ fn check(
     rule: impl Fn(f64) -> Result<(), SpecProblem>,
 ) -> Result<(), CaptureError> {
     for (list, channel) in of_converters.iter().zip(1..) {
-        let refused = |problem| CaptureError::Level { what, channel, problem };
+        let refused = |problem| CaptureError::Level { what, channel, problem: Box::new(problem) };
         list.iter().try_for_each(|value| rule(*value)).map_err(refused)?;
     }
     Ok(())
