@@ -38,8 +38,9 @@ pub enum ExportError {
     },
     /// The bank corrects a nonlinearity, for which the format has no place.
     #[error(
-        "channel {channel} has a nonlinearity, which only `fuse`, `stream`, Python, the C library and Verilog correct; \
-         take it out of the spec, design the bank again, and correct the samples before the filters"
+        "channel {channel} has a nonlinearity, which only `fuse`, `stream`, Python, the C library and Verilog with \
+         constant taps correct; take it out of the spec, design the bank again, and correct the samples before the \
+         filters"
     )]
     Nonlinearity {
         /// Number of the channel, from 1.
@@ -56,15 +57,6 @@ pub enum ExportError {
         bits: u32,
         /// Most bits.
         most: u32,
-    },
-    /// The words that are loaded are taps and offsets.
-    #[error(
-        "a circuit whose taps are loaded has no place for the nonlinearity of channel {channel}; write one with \
-         constant taps, or take the nonlinearity out of the spec and correct the samples before the filters"
-    )]
-    LoadedNonlinearity {
-        /// Number of the channel, from 1.
-        channel: usize,
     },
     /// Integer code needs the full scale to which an offset is relative.
     #[error(
@@ -154,21 +146,8 @@ pub enum ExportError {
 
 /// Refuses a bank that corrects nonlinearities.
 pub(super) fn check_straight(bank: &Bank) -> Result<(), ExportError> {
-    match first_curve(bank) {
-        Some(channel) => Err(ExportError::Nonlinearity { channel }),
+    match bank.nonlinearity.iter().position(|curve| !curve.is_empty()) {
+        Some(i) => Err(ExportError::Nonlinearity { channel: i + 1 }),
         None => Ok(()),
     }
-}
-
-/// Refuses it for a circuit whose taps are loaded.
-pub(super) fn check_loadable(bank: &Bank) -> Result<(), ExportError> {
-    match first_curve(bank) {
-        Some(channel) => Err(ExportError::LoadedNonlinearity { channel }),
-        None => Ok(()),
-    }
-}
-
-/// The first channel with a nonlinearity, from 1.
-fn first_curve(bank: &Bank) -> Option<usize> {
-    bank.nonlinearity.iter().position(|curve| !curve.is_empty()).map(|i| i + 1)
 }

@@ -318,7 +318,7 @@ fn tables_take_out_nonlinearities() {
         assert!(is_good, "{said}");
     }
     for (flags, words) in [
-        (&["--input-bits", "8", "--loadable"][..], "channel 1; write one with constant taps"),
+        (&["--input-bits", "8", "--loadable"][..], "Verilog with constant taps"),
         (&["--input-bits", "15"], "14 bits are the most"),
     ] {
         desk.refused(1, &[&["export", "b.json", "-o", "no.v"], flags].concat(), &[words]);

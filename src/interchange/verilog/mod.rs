@@ -14,7 +14,7 @@ mod testbench;
 
 use super::bit_true::{BitTrue, IntegerFilters, WordSizes};
 use super::c99;
-use super::error::{ExportError, check_loadable};
+use super::error::{ExportError, check_straight};
 use super::straightening::{GUARD_BITS, Straightening};
 use crate::bank::{Bank, FixedPoint};
 use crate::spec::WordLengths;
@@ -142,7 +142,7 @@ impl Verilog {
         let words = options.words(bank)?;
         options.check_clocks()?;
         if options.is_loadable {
-            check_loadable(bank)?;
+            check_straight(bank)?;
         }
         let model = BitTrue::new(bank, words)?;
         let (frames, clocks) =
