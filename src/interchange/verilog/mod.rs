@@ -265,7 +265,7 @@ fn about(bank: &Bank, model: &BitTrue, words: WordSizes, circuit: &Circuit, layo
         },
         bank.latency,
         c99::gammas(bank),
-        arithmetic(model, words, circuit.needed_accumulator_bits),
+        arithmetic(bank, model, words, circuit.needed_accumulator_bits),
     )
 }
 
@@ -297,8 +297,8 @@ fn listed(noun: &str, letter: &str, numbers: std::ops::Range<usize>) -> String {
 }
 
 /// What becomes of the samples, and where bits are lost.
-fn arithmetic(model: &BitTrue, words: WordSizes, needed: u32) -> String {
-    let offsets = if model.filters.has_offsets() {
+fn arithmetic(bank: &Bank, model: &BitTrue, words: WordSizes, needed: u32) -> String {
+    let offsets = if bank.offsets.iter().any(|offset| *offset != 0.0) {
         " The offsets of the channels are subtracted as constants."
     } else {
         ""
