@@ -338,7 +338,7 @@ pub(super) fn figure_text(figures: &Figures, is_normalised: bool) -> String {
         let colon = if value == "none" { ":" } else { "" };
         format!("{name:<10} {value}{colon} {meaning}\n")
     };
-    figure_facts(figures, is_normalised).map(line).concat()
+    figure_facts(figures, is_normalised).into_iter().map(line).collect()
 }
 
 /// Why no bound is stated.

@@ -1,5 +1,5 @@
-//! `--track` of `fuse` and `stream`, and `fuse --stamps`: delays that change, from a table, and samples with
-//! stamps of their own.
+//! `--track` of `fuse` and `stream`, and `fuse --stamps`: delays and levels that change, from a table, and
+//! samples with stamps of their own.
 
 use super::interrupt::interrupts;
 use super::observer::RunObserver;
@@ -10,7 +10,7 @@ use super::print::{
 use super::run::{BankRun, each_block, frames_of};
 use super::written::{Mono, begin_recording, check_outputs};
 use hybank::bank::Bank;
-use hybank::captures::{Converters, FileFormat};
+use hybank::captures::{Converters, FileFormat, LevelChange, LevelTrack};
 use hybank::files::{Bound, commit_all, read_text};
 use hybank::io::table::{TableOptions, read_stamped};
 use hybank::io::{MultiReader, RecordedFrames};
@@ -45,9 +45,10 @@ pub(super) struct InstantArgs {
 #[derive(Debug, clap::Args)]
 pub(super) struct TrackArgs {
     /// Follow delays that change: drift.jsonl of `align --trim`, or a table (.csv) of a time and the delay
-    /// of each channel, both in seconds, with headings, as `time,delay 1,delay 2`. Taps are made for the
-    /// delays at hand in place of those of the spec; lost samples are left out. `stream` gives the samples
-    /// of `fuse`, blocks of 64 frames as soon as the 38 frames after them are there
+    /// of each channel, both in seconds, with headings, as `time,delay 1,delay 2`. Columns with the gain of
+    /// each channel, and then with its offset, may follow. Taps are made for the delays at hand in place of
+    /// those of the spec, and samples lose the offset and the gain at hand; lost samples are left out.
+    /// `stream` gives the samples of `fuse`, blocks of 64 frames as soon as the 38 frames after them are there
     #[arg(long, value_name = "FILE", conflicts_with_all =
           ["algorithm", "gaps", "report", "interleaved", "threads"])]
     track: Option<PathBuf>,
@@ -63,6 +64,9 @@ struct TrackedReport {
     worst_second_db: f64,
     /// After the first sample.
     worst_second_at: f64,
+    /// By how much the gains and offsets of the table change, if it has them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    levels: Option<LevelChange>,
     /// True if a signal ended the stream.
     interrupted: bool,
     warnings: Vec<String>,
@@ -80,19 +84,39 @@ impl TrackArgs {
     }
 }
 
-/// What fuses by the delays of a table.
-pub(super) fn fusion(job: &BankRun<'_>, table: &Path) -> Result<TrackedFusion, Failure> {
-    let track = read(table, job.bank)?;
-    TrackedFusion::new(job.bank, &track).map_err(|error| match error {
+/// What fuses by a table.
+pub(super) struct TableFusion {
+    fusion: TrackedFusion,
+    levels: Option<LevelTrack>,
+    frames: usize,
+}
+
+/// What fuses by the delays, gains and offsets of a table.
+pub(super) fn fusion(job: &BankRun<'_>, table: &Path) -> Result<TableFusion, Failure> {
+    let Drift { delays, levels } = read(table, job.bank)?;
+    let corrected = levels.as_ref().map(LevelTrack::bank);
+    let fusion = TrackedFusion::new(corrected.as_ref().unwrap_or(job.bank), &delays);
+    let fusion = fusion.map_err(|error| match error {
         MergeError::Design(_) | MergeError::OwnRates => failed_at(job.bank_path, error),
         error => failed_at(table, error),
-    })
+    })?;
+    Ok(TableFusion { fusion, levels, frames: 0 })
+}
+
+impl TableFusion {
+    fn push(&mut self, mut channels: Vec<Vec<f64>>) -> Result<Vec<f64>, MergeError> {
+        if let Some(levels) = &self.levels {
+            levels.correct(self.frames, &mut channels);
+        }
+        self.frames += channels.first().map_or(0, Vec::len);
+        self.fusion.push(&channels)
+    }
 }
 
 /// Fuses what `reader` gives.
 pub(super) fn run(
     job: &BankRun<'_>,
-    fusion: TrackedFusion,
+    fusion: TableFusion,
     mut reader: MultiReader,
     observer: &mut RunObserver,
 ) -> Result<(), Failure> {
@@ -125,14 +149,15 @@ struct TrackedRun<'a> {
 impl TrackedRun<'_> {
     fn all(
         mut self,
-        mut fusion: TrackedFusion,
+        mut fusion: TableFusion,
         reader: &mut MultiReader,
         observer: &mut RunObserver,
     ) -> Result<(), Failure> {
         let interrupted = each_block(reader, observer, |_, recordings| {
-            self.write(&fusion.push(&channels(recordings)).map_err(failed)?)
+            self.write(&fusion.push(channels(recordings)).map_err(failed)?)
         })?;
-        let (last, quality) = fusion.finish().map_err(failed)?;
+        let levels = fusion.levels.as_ref().map(LevelTrack::change);
+        let (last, quality) = fusion.fusion.finish().map_err(failed)?;
         self.write(&last)?;
         let Self { job, outputs, rate, samples, clipped } = self;
         let clipped =
@@ -147,7 +172,12 @@ impl TrackedRun<'_> {
         }
         report(
             job,
-            TrackedReport { interrupted, warnings, ..TrackedReport::new(samples, rate, 0.0, quality) },
+            TrackedReport {
+                levels,
+                interrupted,
+                warnings,
+                ..TrackedReport::new(samples, rate, 0.0, quality)
+            },
         )
     }
 
@@ -208,10 +238,16 @@ pub(super) fn fuse_stamps(job: &BankRun<'_>, inputs: &[PathBuf], format: &FileFo
     report(job, TrackedReport { warnings, ..report_of })
 }
 
-/// Reads the table of delays: lines of JSON as `align` writes them, or a table with headings.
-fn read(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
+/// What a table says of the converters.
+struct Drift {
+    delays: DelayTrack,
+    levels: Option<LevelTrack>,
+}
+
+/// Reads the table: lines of JSON as `align` writes them, or a table with headings.
+fn read(path: &Path, bank: &Bank) -> Result<Drift, Failure> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("jsonl")) {
-        return read_lines(path, bank);
+        return Ok(Drift { delays: read_lines(path, bank)?, levels: None });
     }
     let table = read_stamped(path, &TableOptions::default()).map_err(failed)?.ok_or_else(|| {
         failed_at(
@@ -219,8 +255,17 @@ fn read(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
             "no table of delays: its first line has no headings of which the first is a time, as `time,delay 1,delay 2`",
         )
     })?;
+    let (mut columns, channels) = (table.columns, bank.channel_count());
+    let mut levels = None;
+    if columns.len() == 2 * channels || columns.len() == 3 * channels {
+        let mut gains = columns.split_off(channels);
+        let offsets = (gains.len() > channels).then(|| gains.split_off(channels));
+        let track = LevelTrack::new(bank, table.stamps.clone(), gains, offsets);
+        levels = Some(track.map_err(|error| failed_at(path, error))?);
+    }
     let seconds = |column: Vec<f64>| column.into_iter().map(Seconds).collect();
-    Ok(DelayTrack { times: table.stamps, delays: table.columns.into_iter().map(seconds).collect() })
+    let delays = DelayTrack { times: table.stamps, delays: columns.into_iter().map(seconds).collect() };
+    Ok(Drift { delays, levels })
 }
 
 /// A line of `drift.jsonl`.
@@ -258,6 +303,7 @@ impl TrackedReport {
             predicted_snr_db: quality.snr.0,
             worst_second_db: quality.worst_second.0,
             worst_second_at: quality.worst_at.0,
+            levels: None,
             interrupted: false,
             warnings: Vec::new(),
         }
@@ -272,12 +318,19 @@ fn report(job: &BankRun<'_>, report: TrackedReport) -> Result<(), Failure> {
         return Ok(());
     }
     print(&format!(
-        "{}: {} at {}, predicted SNR {:.1} dB, {:.1} dB in the worst second ({:.1} s after the beginning)\n",
+        "{}: {} at {}, predicted SNR {:.1} dB, {:.1} dB in the worst second ({:.1} s after the beginning){}\n",
         Quoted(job.output),
         counted(report.samples, "sample"),
         readable(report.rate, "S/s"),
         report.predicted_snr_db,
         report.worst_second_db,
-        report.worst_second_at
+        report.worst_second_at,
+        report.levels.map_or_else(String::new, level_text)
     ))
+}
+
+fn level_text(LevelChange { gain, offset }: LevelChange) -> String {
+    let offsets =
+        if offset > 0.0 { format!(", offsets by up to {offset:.2e} of full scale") } else { String::new() };
+    format!("; samples corrected by the table, where gains change by up to {:.3} %{offsets}", 100.0 * gain)
 }

@@ -1,4 +1,4 @@
-"""Two and more recorders at one event, merged by hybank and by the usual simple ways, judged by the exact signal.
+"""Two and more recorders at one event, merged by hybank and by the usual ways, judged by the exact signal.
 
     python3 examples/merge/scenes.py [NAME ..]      needs numpy, scipy, soundfile, and hybank on the path (or HYBANK)
 

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Tables of what `hybank` does with virtual converters, beside the simple ways.
+"""Tables of what `hybank` does with virtual converters, beside the usual ways.
 
     python3 examples/tables/tables.py [quad|four|if|rates ...]
 
 Every step is a command of `hybank`, which must be in PATH; `--show` prints the commands. What this script does
 itself: it writes codes in turn into one table as a capture board does, makes noise, and
-computes the simple ways (simple.py). It needs numpy and scipy.
+computes the usual ways (usual.py). It needs numpy and scipy.
 """
 
 import json
@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-import simple
+import usual
 
 SHOW = "--show" in sys.argv
 
@@ -131,7 +131,7 @@ def quad():
 
         nine = [f"z{k}.csv" for k in range(9)]
         learnt = [(capture(name, tone, 32768), [tone * 1e6]) for name, tone in zip(nine, NINE)]
-        known = simple.Errors(learnt, rate, 3)
+        known = usual.Errors(learnt, rate, 3)
         for name, captures in [("one", nine[4:5]), ("nine", nine)]:
             hybank("calibrate", "quad.toml", *captures, "--interleaved", 4, "--reference", 4, "-o", f"{name}.toml", "--force")
             hybank("design", f"{name}.toml", "-o", f"{name}.json", "--force")
@@ -143,7 +143,7 @@ def quad():
                 hybank("fuse", f"{name}.json", "held.csv", "--interleaved", 4, "-o", "y.wav", "--force")
                 found.append(figures("y.wav", f"{tone}MHz", rate))
             found += [figures(way(known, held, rate), f"{tone}MHz", rate)
-                      for way in (simple.spline, simple.delay_filters)]
+                      for way in (usual.spline, usual.delay_filters)]
             row(unit, f"{tone:.0f} MHz", *map(both, found))
 
 
@@ -180,7 +180,7 @@ def four():
            "--fit", "delay,gain,offset,cutoff", "--force")
     for name in ("four", "measured"):
         hybank("design", f"{name}.toml", "-o", f"{name}.json", "--force")
-    known = simple.Errors([(channels("training", 4), [tone * 1e6 for tone in tones])], rate, 3)
+    known = usual.Errors([(channels("training", 4), [tone * 1e6 for tone in tones])], rate, 3)
     print("\nSFDR and SINAD of three tones; skews of 3 ps, cut-offs 1 % apart, 100 fs of jitter.\n")
     head("tone", "as captured", "spec of the drawing", "calibrated", "numpy: spline", "numpy: delay filters")
     shown = lambda found: f"{found['sfdr_db']:.1f} dBc, {found['sinad_db']:.1f} dB"
@@ -191,7 +191,7 @@ def four():
         for name in ("four", "measured"):
             hybank("fuse", f"{name}.json", *files("held"), "-o", "y.wav", "--force")
             found.append(figures("y.wav", tone, rate))
-        found += [figures(way(known, held, rate), tone, rate) for way in (simple.spline, simple.delay_filters)]
+        found += [figures(way(known, held, rate), tone, rate) for way in (usual.spline, usual.delay_filters)]
         row(tone.replace("MHz", " MHz"), *map(shown, found))
 
 
@@ -228,7 +228,7 @@ def intermediate():
     hybank("calibrate", "if.toml", *files("training"), "-o", "measured.toml", "--reference", 4, "--force")
     for name in ("if", "measured"):
         hybank("design", f"{name}.toml", "-o", f"{name}.json", "--force")
-    known = simple.Errors([(channels("training", 4), [tone * 1e6 for tone in tones])], rate, 3)
+    known = usual.Errors([(channels("training", 4), [tone * 1e6 for tone in tones])], rate, 3)
     print("\nSFDR and SINAD of tones after a band-pass of order 4 from 600 to 900 MHz, without `--tone`.\n")
     head("tone", "as captured", "spec of the drawing", "calibrated", "numpy: gains and offsets")
     shown = lambda found: f"{found['sfdr_db']:.1f} dBc, {found['sinad_db']:.1f} dB"
@@ -314,9 +314,9 @@ def rates():
         hybank("fuse", "example.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "y.wav", "--force")
         measured = hybank("measure", "y.wav", "--ref", "cap/target.wav", "--skip", 300, report=True)
         predicted = found["figures"]
-        simple_ways = {way["way"]: way["snr_db"] for way in predicted["simple"]}
+        ratios = {way["way"]: way["snr_db"] for way in predicted["usual_ways"]}
         row(name, *(f"{x:.1f}" for x in (predicted["snr"]["total_db"], measured["reference"]["snr_db"],
-                                         simple_ways.get("cubic-spline", np.nan), simple_ways["one-channel"])))
+                                         ratios.get("cubic-spline", np.nan), ratios["one-channel"])))
 
 
 def spec_rate(text):

@@ -141,8 +141,9 @@ class Figures:
     band
         The band of the figures, ``low_hertz`` to ``high_hertz``, and the ``source`` that says so.
     snr
-        Signal-to-noise ratio: ``total_db`` with all parts that the spec states, and the parts ``signal_db``, ``noise_db``
-        of the converters, and ``delays_db``, ``gains_db`` and ``offsets_db`` of uncertain values, None without.
+        Signal-to-noise ratio: ``total_db`` with all parts that the spec states, and the parts ``signal_db``,
+        ``bits_db``, ``noise_db`` and ``jitter_db`` of the converters, and ``delays_db``, ``gains_db`` and ``offsets_db`` of
+        uncertain values, None without.
     snr_16_bits_db
         With 16-bit converters; None where the spec states noise.
     image
@@ -154,10 +155,11 @@ class Figures:
         The same for the largest error of gain and phase.
     target_vanishes
         The target is zero somewhere in the band; the tones there are left out.
-    simple
-        The usual ways, the best one first: ``way`` ("one-channel", "interleaving", "own-correction", "cubic-spline"; last
-        "least-squares", which has taps as the bank has), ``channel`` (from 1) of the first one, and ``snr_db``.
-    gain_over_simple_db
+    usual_ways
+        The best one first: ``way`` ("one-channel", "interleaving", "own-correction", "cubic-spline"; last
+        "least-squares", which has taps as the bank has), ``channel`` (from 1) of the first one, ``snr_db`` and
+        ``sfdr_db``, None of one channel.
+    gain_over_usual_ways_db
         The gain over the best of them, for the same converters.
     any_input
         gamma for inputs of any spectrum; None for a spec without signal.
@@ -170,8 +172,8 @@ class Figures:
     image_at_worst: Record | None
     gain_error: Record | None
     target_vanishes: bool
-    simple: list[Record]
-    gain_over_simple_db: float | None
+    usual_ways: list[Record]
+    gain_over_usual_ways_db: float | None
     any_input: float | None
 
     def __repr__(self):

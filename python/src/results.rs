@@ -58,12 +58,12 @@ impl<'py> Made<'py> {
 pub(crate) struct FiguresReport {
     #[serde(flatten)]
     figures: Figures,
-    gain_over_simple_db: Option<Decibels>,
+    gain_over_usual_ways_db: Option<Decibels>,
 }
 
 impl FiguresReport {
     pub(crate) fn new(bank: &Bank) -> Result<Self, DesignError> {
         let figures = Figures::new(bank)?;
-        Ok(Self { gain_over_simple_db: figures.gain_over_simple(), figures })
+        Ok(Self { gain_over_usual_ways_db: figures.gain_over_usual_ways(), figures })
     }
 }

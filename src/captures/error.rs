@@ -3,6 +3,7 @@
 use crate::io::{IoError, OfflineError};
 use crate::messages::Quoted;
 use crate::pipeline::matching::InputMismatch;
+use crate::spec::SpecProblem;
 
 /// Why captures cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -24,6 +25,16 @@ pub enum CaptureError {
         name: String,
         /// Its channels.
         channels: usize,
+    },
+    /// A gain or an offset of a table.
+    #[error("a {what} of channel {channel}: {problem}")]
+    Level {
+        /// Gain or offset.
+        what: &'static str,
+        /// From 1.
+        channel: usize,
+        /// The rule.
+        problem: Box<SpecProblem>,
     },
     /// A sample that is no number.
     #[error("sample {sample} is {value}, and all are needed; repair the recording first")]

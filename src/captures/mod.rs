@@ -23,8 +23,10 @@ mod channel;
 mod converters;
 mod error;
 mod in_memory;
+mod levels;
 
 pub use channel::ChannelSamples;
 pub use converters::{Converters, FileFormat};
 pub use error::CaptureError;
 pub use in_memory::Captures;
+pub use levels::{LevelChange, LevelTrack};

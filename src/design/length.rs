@@ -214,7 +214,7 @@ impl<'a> Lengths<'a> {
             [] => vec![Deviations::default(); self.spec.channels.len()],
             own => own.to_vec(),
         };
-        let tones = ToneResponse::new(&SynthesisFilters::Fir(filters.to_vec()), plain, spread)?;
+        let tones = ToneResponse::of_bank(&SynthesisFilters::Fir(filters.to_vec()), plain, spread)?;
         Ok(tones.worst(band).image.map_or(f64::NEG_INFINITY, |tone| -2.0 * decibels(tone.image)))
     }
 

@@ -58,7 +58,7 @@ pub use responses::error_response;
 pub(crate) use signal::{AliasColumns, SampledSignal};
 pub use sizing::Sizing;
 pub use tones::ToneOutput;
-pub(crate) use tones::{ToneResponse, Worst};
+pub(crate) use tones::{PeriodicFilters, ToneResponse, Worst};
 pub use warnings::warnings;
 
 use crate::bank::{Bank, Proof};

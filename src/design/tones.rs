@@ -59,26 +59,44 @@ pub struct ToneOutput {
     pub gain_error: f64,
 }
 
-/// A bank that answers tones.
-pub(crate) struct ToneResponse {
+/// F at each angle of the slow rate, of a bank or of another way from slow samples to fast ones.
+pub(crate) struct PeriodicFilters<'a> {
+    /// F, M x N.
+    pub(crate) at: Box<dyn Fn(f64) -> CMat + 'a>,
+    /// Slow periods that the filters see.
+    pub(crate) lags: usize,
+    /// Angles from 0 to pi between which F is smooth.
+    pub(crate) breaks: Vec<f64>,
+}
+
+/// A bank, or another way, that answers tones.
+pub(crate) struct ToneResponse<'a> {
     problem: Problem,
-    filters: FilterResponse,
+    filters: PeriodicFilters<'a>,
     /// Of the converters.
     spread: Vec<Deviations>,
 }
 
-impl ToneResponse {
+impl<'a> ToneResponse<'a> {
     /// Of `filters` after the front ends of `problem`, without the spectrum of a signal, for converters that
     /// are off by so much.
+    pub(crate) fn new(filters: PeriodicFilters<'a>, problem: Problem, spread: Vec<Deviations>) -> Self {
+        Self { problem, filters, spread }
+    }
+
+    /// The same of the filters of a bank.
     ///
     /// # Errors
     /// [`DesignError::Lti`] for unstable filters.
-    pub(crate) fn new(
+    pub(crate) fn of_bank(
         filters: &SynthesisFilters,
         problem: Problem,
         spread: Vec<Deviations>,
     ) -> Result<Self, DesignError> {
-        Ok(Self { filters: FilterResponse::new(filters, problem.ratio)?, problem, spread })
+        let filters = FilterResponse::new(filters, problem.ratio)?;
+        let (lags, breaks) = (filters.lags(), filters.breaks());
+        let filters = PeriodicFilters { at: Box::new(move |theta| filters.at(theta)), lags, breaks };
+        Ok(Self::new(filters, problem, spread))
     }
 
     /// The output at w / (2 pi) = `frequency`.
@@ -94,7 +112,7 @@ impl ToneResponse {
                 passed[channel.front_end] * Complex::from_polar(channel.gain, -w * delay)
             })
             .collect();
-        let filters = self.filters.at(w * *ratio as f64);
+        let filters = (self.filters.at)(w * *ratio as f64);
         let mean = |i: usize| samples[i] * self.spread[channels[i].converter].mean_phase(w);
         let outputs = answer(&filters, 0..samples.len(), w, mean);
         // The powers of what the outputs have beside their means.
@@ -153,13 +171,13 @@ impl ToneResponse {
     /// Points dense enough for every peak of the filters, and those at the resonances of a recursion.
     fn grid(&self, [low, high]: [CyclesPerFastPeriod; 2]) -> Vec<ToneOutput> {
         let period = self.problem.ratio as f64;
-        let work = self.filters.lags() * self.problem.ratio * self.problem.channels.len();
-        let peaks = (high.0 - low.0) * self.filters.lags() as f64 * period;
+        let work = self.filters.lags * self.problem.ratio * self.problem.channels.len();
+        let peaks = (high.0 - low.0) * self.filters.lags as f64 * period;
         let wanted = (SETTINGS.per_peak * peaks).clamp(*POINTS.start(), *POINTS.end());
         let step = (high.0 - low.0) / wanted.min(SETTINGS.most_work / work as f64).max(100.0).floor();
         let even = (0..=((high.0 - low.0) / step).round() as usize).map(|k| low.0 + step * k as f64);
         let turns = (low.0 * period).floor() as i64..=(high.0 * period).ceil() as i64;
-        let breaks = self.filters.breaks();
+        let breaks = &self.filters.breaks;
         let folded = turns.flat_map(|turn| {
             breaks.iter().flat_map(move |b| [b / TAU, -b / TAU].map(|x| (turn as f64 + x) / period))
         });

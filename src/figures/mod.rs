@@ -1,5 +1,5 @@
 //! Figures of a bank in the user's terms: the signal-to-noise ratio of the spec's signal, the largest image
-//! and the largest error of gain of a tone, and what the simple ways would give.
+//! and the largest error of gain of a tone, and what the usual ways would give.
 //!
 //! # Tones
 //! A tone at the analog frequency w gives the samples `g_i Phi_i(j w) e^{-j w D_i} e^{j w k M}` (h = 1), and
@@ -16,38 +16,39 @@
 //! offsets that are off add ([`Snr`]). All are integrals of amplitudes over frequency, so 200 dB are
 //! resolved.
 //!
-//! # Simple ways
+//! # Usual ways
 //! One channel alone with its Wiener filter, plain interleaving, each channel's own correction, and the
 //! cubic spline through all samples, for the same signal, noise and uncertainty, from their exact
-//! periodically time-varying responses. Beside them stand the taps of least squares that are as long as the
-//! bank's. A bank of one channel is not compared with one channel. Where the spec states no noise, all are
-//! compared with converters of 16 bits: without any noise one channel alone would be exact wherever the
-//! signal fits into it.
+//! periodically time-varying responses. Each has an SNR, and an SFDR unless it is one channel alone. Beside
+//! them stand the taps of least squares that are as long as the bank's. A bank of one channel is not compared
+//! with one channel. Where the spec states no noise, all are compared with converters of 16 bits: without any
+//! noise one channel alone would be exact wherever the signal fits into it.
 
 mod correction;
 mod integral;
 mod powers;
 mod reconstruction;
 mod setup;
-mod simple;
 mod snr;
 mod spline;
 #[cfg(test)]
 mod tests;
+mod usual_ways;
 
 pub use crate::design::{BandSource, FigureBand, ToneOutput};
-pub use setup::{NoiseSources, Setup};
-pub use simple::{Alone, SimpleFigure, SimpleWay};
+pub use setup::Setup;
 pub use snr::Snr;
+pub use usual_ways::{Alone, UsualFigure, UsualWay};
 
 use crate::analog::resolved_band;
 use crate::bank::Bank;
 use crate::design::{DesignError, Deviations, LiftedPlant, Problem, ToneResponse, Worst};
 use crate::spec::{Band, Spec};
 use crate::units::{CyclesPerFastPeriod, Decibels, Hertz};
+use reconstruction::Reconstruction;
 use snr::Setting;
 
-/// By how many decibels a bank must beat the simple ways to be worth its trouble.
+/// By how many decibels a bank must beat the usual ways to be worth its trouble.
 const LEAST_GAIN: Decibels = Decibels(1.0);
 
 /// Share of the resolved band that a signal may take, so that a filter can end it.
@@ -73,7 +74,7 @@ pub struct Figures {
     /// Whether the target is zero somewhere in the band; the tones there are left out.
     pub target_vanishes: bool,
     /// The usual ways, the best one first; least-squares taps come last.
-    pub simple: Vec<SimpleFigure>,
+    pub usual_ways: Vec<UsualFigure>,
     /// gamma for inputs of any spectrum; `None` without `[signal]`, where gamma says it.
     pub any_input: Option<f64>,
     /// How the bank was designed.
@@ -107,12 +108,18 @@ impl Figures {
         let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
         let plain = without_signal(spec, bank.latency)?;
         let band = FigureBand::new(spec, &plain);
-        let tones = ToneResponse::new(&bank.filters, plain.clone(), Deviations::of_spec(spec))?;
+        let tones = ToneResponse::of_bank(&bank.filters, plain.clone(), Deviations::of_spec(spec))?;
         let Worst { image, image_at_worst, gain_error, vanishes } = tones.worst(band.cycles(spec));
         let setting = Setting::new(spec, bank.latency)?;
-        let ways = simple::usual_ways(bank, spec, setting.problem(), band.cycles(spec))?;
+        let ways = usual_ways::usual_ways(bank, spec, setting.problem(), band.cycles(spec))?;
         let ratios = setting.ratios(&ways);
         let own = setting.ratio_of_bank(bank)?;
+        let sfdr = |way: &Reconstruction| {
+            // One channel alone has its images as they are.
+            way.is_relative().then_some(())?;
+            let tones = ToneResponse::new(setting.filters(way), plain.clone(), Deviations::of_spec(spec));
+            tones.worst(band.cycles(spec)).image.map(|tone| -Decibels::of_amplitude(tone.image))
+        };
         Ok(Self {
             band,
             snr: own.snr,
@@ -121,26 +128,26 @@ impl Figures {
             image_at_worst: image_at_worst.map(|tone| ToneFigure::new(spec, &tone, tone.image_at_worst)),
             gain_error: gain_error.map(|tone| ToneFigure::new(spec, &tone, tone.gain_error)),
             target_vanishes: vanishes,
-            simple: simple::figures(&ways, &ratios),
+            usual_ways: usual_ways::figures(&ways, &ratios, sfdr),
             any_input: any_input(bank, spec, &plain)?,
             setup: Setup::new(bank, spec),
         })
     }
 
-    /// The ratio by which the bank is compared with the simple ways: that of `snr`, or with converters of 16
+    /// The ratio by which the bank is compared with the usual ways: that of `snr`, or with converters of 16
     /// bits where the spec states no noise.
     pub fn compared_snr(&self) -> Decibels {
         self.snr_16_bits_db.unwrap_or(self.snr.total_db)
     }
 
-    /// By how much the bank beats the best of the simple ways.
-    pub fn gain_over_simple(&self) -> Option<Decibels> {
-        Some(self.compared_snr() - self.simple.first()?.snr_db)
+    /// By how much the bank beats the best of the usual ways.
+    pub fn gain_over_usual_ways(&self) -> Option<Decibels> {
+        Some(self.compared_snr() - self.usual_ways.first()?.snr_db)
     }
 
-    /// Whether the bank beats the simple ways by a decibel.
+    /// Whether the bank beats the usual ways by a decibel.
     pub fn is_worthwhile(&self) -> bool {
-        self.gain_over_simple().is_some_and(|gain| gain >= LEAST_GAIN)
+        self.gain_over_usual_ways().is_some_and(|gain| gain >= LEAST_GAIN)
     }
 }
 
@@ -172,7 +179,7 @@ impl KeyFigures {
         let plain = without_signal(spec, bank.latency)?;
         let band = FigureBand::new(spec, &plain).cycles(spec);
         let Worst { image, .. } =
-            ToneResponse::new(&bank.filters, plain, Deviations::of_spec(spec))?.worst(band);
+            ToneResponse::of_bank(&bank.filters, plain, Deviations::of_spec(spec))?.worst(band);
         let image_db = image.map(|tone| Decibels::of_amplitude(tone.image));
         Ok(Self { snr_db: snr(bank)?.total_db, image_db })
     }
@@ -201,7 +208,7 @@ pub fn tone_curve(bank: &Bank, points: usize) -> Result<Vec<(Hertz, ToneOutput)>
     let spec = bank.spec.as_ref().ok_or(DesignError::NoSpec)?;
     let plain = without_signal(spec, bank.latency)?;
     let band = FigureBand::new(spec, &plain).cycles(spec);
-    let tones = ToneResponse::new(&bank.filters, plain, Deviations::of_spec(spec))?.curve(band, points);
+    let tones = ToneResponse::of_bank(&bank.filters, plain, Deviations::of_spec(spec))?.curve(band, points);
     let hertz = |CyclesPerFastPeriod(f): CyclesPerFastPeriod| Hertz(f / spec.fast_period.0);
     Ok(tones.into_iter().map(|tone| (hertz(tone.frequency), tone)).collect())
 }

@@ -16,10 +16,27 @@ const ANGLES: std::ops::RangeInclusive<f64> = 120.0..=40_000.0;
 pub(super) struct Conditions {
     /// The signal.
     pub(super) signal: SampledSignal,
-    /// s_i^2 of each channel, in the scale of the signal.
-    pub(super) noise: Vec<f64>,
+    /// s_i^2 of each channel by its sources, in the scale of the signal.
+    pub(super) noise: Vec<NoisePowers>,
     /// How far each converter is from the spec; offsets are in the scale of the signal.
     pub(super) spread: Vec<Deviations>,
+}
+
+/// Powers of noise by its sources.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct NoisePowers {
+    /// The rounding to bits.
+    pub(super) bits: f64,
+    /// The converter's noise.
+    pub(super) noise: f64,
+    /// Jitter.
+    pub(super) jitter: f64,
+}
+
+impl NoisePowers {
+    pub(super) fn total(&self) -> f64 {
+        self.bits + self.noise + self.jitter
+    }
 }
 
 /// Mean squares per fast sample.
@@ -34,7 +51,7 @@ pub(super) struct Powers {
     /// Of the uncertain offsets at the output.
     pub(super) offsets: f64,
     /// Of the noise at the output.
-    pub(super) noise: f64,
+    pub(super) noise: NoisePowers,
 }
 
 /// The mean square of the target.
@@ -51,8 +68,7 @@ impl Conditions {
     pub(super) fn powers(&self, ways: &[Reconstruction]) -> Vec<Powers> {
         let problem = self.signal.problem();
         let size = problem.ratio * problem.channels.len();
-        let lags = |way: &Reconstruction| way.filters().map_or(1, |filters| filters.lags());
-        let work: usize = ways.iter().map(|way| size * (lags(way) + self.signal.columns())).sum();
+        let work: usize = ways.iter().map(|way| size * (way.lags() + self.signal.columns())).sum();
         let breaks =
             even_and(self.signal.breaks().into_iter().chain(ways.iter().flat_map(Reconstruction::breaks)));
         let means = mean_over_circle(&breaks, angles(work), &mut |theta| {
@@ -66,9 +82,19 @@ impl Conditions {
             late: p[1] * per_sample,
             gains: p[2] * per_sample,
             offsets: self.offsets(way) * per_sample,
-            noise: p[3] * per_sample,
+            noise: NoisePowers {
+                bits: p[3] * per_sample,
+                noise: p[4] * per_sample,
+                jitter: p[5] * per_sample,
+            },
         };
-        ways.iter().zip(means.chunks_exact(4)).map(powers).collect()
+        ways.iter().zip(means.chunks_exact(6)).map(powers).collect()
+    }
+
+    /// F of a way at an angle with these columns.
+    pub(super) fn filters(&self, way: &Reconstruction, theta: f64, columns: &AliasColumns) -> CMat {
+        let noise: Vec<f64> = self.noise.iter().map(NoisePowers::total).collect();
+        way.at(theta, columns, &noise)
     }
 
     /// The power of uncertain offsets over the M phases: what the filters make of constants.
@@ -76,7 +102,7 @@ impl Conditions {
         if self.spread.iter().all(|spread| spread.offset == 0.0) {
             return 0.0;
         }
-        let filters = way.at(0.0, &self.signal.at(0.0), &self.noise);
+        let filters = self.filters(way, 0.0, &self.signal.at(0.0));
         let constant = CMat::from_element(filters.ncols(), 1, Complex::ONE);
         self.of_converters(|spread, samples| spread.offset.powi(2) * power(&filters, &constant, samples))
     }
@@ -94,8 +120,8 @@ impl Conditions {
         theta: f64,
         columns: &AliasColumns,
         late: Option<&AliasColumns>,
-    ) -> [f64; 4] {
-        let filters = way.at(theta, columns, &self.noise);
+    ) -> [f64; 6] {
+        let filters = self.filters(way, theta, columns);
         let signal = error(columns, &filters);
         let late = late.filter(|_| way.is_relative()).map_or(signal, |late| error(late, &filters));
         let gains = self.of_converters(|spread, samples| match spread.gain {
@@ -104,9 +130,11 @@ impl Conditions {
             }
             _ => 0.0,
         });
-        let noise =
-            filters.column_iter().zip(&self.noise).map(|(column, power)| column.norm_squared() * power);
-        [signal, late, gains, noise.sum()]
+        let noise = |power: fn(&NoisePowers) -> f64| {
+            let of = filters.column_iter().zip(&self.noise);
+            of.map(|(column, noise)| column.norm_squared() * power(noise)).sum()
+        };
+        [signal, late, gains, noise(|of| of.bits), noise(|of| of.noise), noise(|of| of.jitter)]
     }
 
     /// The columns with delays that are off; `None` where all are exact.

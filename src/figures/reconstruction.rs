@@ -1,5 +1,5 @@
 //! Ways from slow samples to fast ones as the matrix F(theta) of their polyphase components: the filters of
-//! a bank, and the simple ways.
+//! a bank, and the usual ways.
 
 use super::correction::Correction;
 use super::spline::Spline;
@@ -50,11 +50,16 @@ impl Reconstruction {
     }
 
     /// The filters, where these are all there is.
-    pub(super) fn filters(&self) -> Option<&FilterResponse> {
+    fn filters(&self) -> Option<&FilterResponse> {
         match self {
             Self::Bank(filters) | Self::LeastSquares(filters) => Some(filters),
             _ => None,
         }
+    }
+
+    /// Slow periods that FIR filters see; 1 of others.
+    pub(super) fn lags(&self) -> usize {
+        self.filters().map_or(1, FilterResponse::lags)
     }
 
     /// Angles between which F is smooth, or where it has narrow peaks.

@@ -1,7 +1,7 @@
 //! What the words about figures need to know of a bank.
 
 use crate::bank::{Bank, SynthesisFilters};
-use crate::spec::{ChannelSpec, Method, Spec};
+use crate::spec::{Method, Spec};
 
 /// How a bank was designed, and for what.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,32 +14,8 @@ pub struct Setup {
     pub ratio: usize,
     /// The number of channels.
     pub channels: usize,
-    /// What the noise of the converters is.
-    pub noise: NoiseSources,
     /// Whether the spec has uncertain cut-offs, which the signal-to-noise ratio does not count.
     pub has_uncertain_cutoffs: bool,
-}
-
-/// What the spec states of the noise of some converter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct NoiseSources {
-    /// The rounding to bits.
-    pub bits: bool,
-    /// Noise.
-    pub noise: bool,
-    /// Jitter.
-    pub jitter: bool,
-}
-
-impl NoiseSources {
-    fn of(spec: &Spec) -> Self {
-        let any = |states: fn(&ChannelSpec) -> bool| spec.channels.iter().any(states);
-        Self {
-            bits: any(|channel| channel.bits.is_some()),
-            noise: any(|channel| channel.noise > 0.0),
-            jitter: any(|channel| channel.jitter.0 > 0.0),
-        }
-    }
 }
 
 impl Setup {
@@ -51,7 +27,6 @@ impl Setup {
             is_recursive: matches!(bank.filters, SynthesisFilters::StateSpace(_)),
             ratio: bank.ratio,
             channels,
-            noise: NoiseSources::of(spec),
             has_uncertain_cutoffs: cutoffs.is_some_and(|shares| shares.into_iter().any(|share| share > 0.0)),
         }
     }

@@ -1,11 +1,11 @@
 //! The signal-to-noise ratio with its parts.
 
-use super::powers::{Conditions, Powers, target_power};
+use super::powers::{Conditions, NoisePowers, Powers, target_power};
 use super::reconstruction::Reconstruction;
 use crate::bank::Bank;
 use crate::design::filters::FilterResponse;
-use crate::design::{DesignError, Deviations, Problem, SampledSignal};
-use crate::spec::{ROUNDING_16_BITS, Spec, USUAL_RMS};
+use crate::design::{DesignError, Deviations, PeriodicFilters, Problem, SampledSignal};
+use crate::spec::{ChannelSpec, ROUNDING_16_BITS, Spec, USUAL_RMS};
 use crate::units::Decibels;
 
 /// Variance of the target over the variance of the error and of its parts, averaged over time.
@@ -15,8 +15,12 @@ pub struct Snr {
     pub total_db: Decibels,
     /// The error from the signal, with the delays of the spec.
     pub signal_db: Decibels,
-    /// The noise of the converters; `None` without any.
+    /// The rounding of the samples to bits; `None` where the spec states none.
+    pub bits_db: Option<Decibels>,
+    /// The same of the noise of the converters.
     pub noise_db: Option<Decibels>,
+    /// The same of their jitter.
+    pub jitter_db: Option<Decibels>,
     /// What delays within the spec's `[uncertainty]` add to the error from the signal: the mean over
     /// Gaussian errors whose 95 % intervals are the stated ones, constant for each converter. `None` where
     /// all delays are exact.
@@ -57,25 +61,33 @@ impl Setting {
     /// # Errors
     /// As [`Problem::new`].
     pub(super) fn new(spec: &Spec, latency: usize) -> Result<Self, DesignError> {
-        let stated: Vec<f64> = spec.channels.iter().map(|channel| channel.sample_noise().powi(2)).collect();
-        let stated = spec.layout().each(&stated);
+        let of_converter = |channel: &ChannelSpec| NoisePowers {
+            bits: channel.rounding().powi(2),
+            noise: channel.noise.powi(2),
+            jitter: 0.0,
+        };
+        let of_converters: Vec<NoisePowers> = spec.channels.iter().map(of_converter).collect();
+        let mut noise = spec.layout().each(&of_converters);
         let jitter = Problem::jitter_shares(spec, latency)?;
         let signal = SampledSignal::of(&Problem::new(spec, latency)?);
         let target = target_power(&signal);
         let rms = spec.signal.as_ref().map(|signal| signal.rms);
-        let noise_is_stated = stated.iter().chain(&jitter).any(|power| *power > 0.0);
+        let is_noisy = |(own, jitter): (&NoisePowers, &f64)| own.total() + jitter > 0.0;
+        let noise_is_stated = noise.iter().zip(&jitter).any(is_noisy);
         let scale = |rms: f64| target / (rms * rms);
         // Without a signal stated noise counts relative to unit density, as in the design.
         let full_scale = match rms {
             None if noise_is_stated => 1.0,
             rms => scale(rms.unwrap_or(USUAL_RMS)),
         };
-        let noise = if noise_is_stated {
-            let own = stated.into_iter().map(|power| power * full_scale);
-            own.zip(jitter).map(|(power, share)| power + share * target).collect()
-        } else {
-            vec![ROUNDING_16_BITS * full_scale; stated.len()]
-        };
+        for (own, share) in noise.iter_mut().zip(jitter) {
+            let bits = if noise_is_stated { own.bits } else { ROUNDING_16_BITS };
+            *own = NoisePowers {
+                bits: bits * full_scale,
+                noise: own.noise * full_scale,
+                jitter: share * target,
+            };
+        }
         let scaled = |spread: Deviations| Deviations { offset: spread.offset * full_scale.sqrt(), ..spread };
         let spread = Deviations::of_spec(spec).into_iter().map(scaled).collect();
         Ok(Self { conditions: Conditions { signal, noise, spread }, target, noise_is_stated })
@@ -84,6 +96,12 @@ impl Setting {
     /// The front ends, with the spectrum of the signal where it is a filter.
     pub(super) fn problem(&self) -> &Problem {
         self.conditions.signal.problem()
+    }
+
+    /// F of a way.
+    pub(super) fn filters<'a>(&'a self, way: &'a Reconstruction) -> PeriodicFilters<'a> {
+        let at = |theta| self.conditions.filters(way, theta, &self.conditions.signal.at(theta));
+        PeriodicFilters { at: Box::new(at), lags: way.lags(), breaks: way.breaks() }
     }
 
     /// The ratio of the bank itself.
@@ -107,17 +125,20 @@ impl Setting {
             self.conditions.spread.iter().any(|spread| error(spread) > 0.0).then(|| db(power.max(0.0)))
         };
         let all = late + gains + offsets;
-        let stated = if self.noise_is_stated { noise } else { 0.0 };
+        let stated = if self.noise_is_stated { noise.total() } else { 0.0 };
+        let of_noise = |power: f64| (self.noise_is_stated && power > 0.0).then(|| db(power));
         Ratios {
             snr: Snr {
                 total_db: db(all + stated),
                 signal_db: db(signal),
-                noise_db: self.noise_is_stated.then(|| db(noise)),
+                bits_db: of_noise(noise.bits),
+                noise_db: of_noise(noise.noise),
+                jitter_db: of_noise(noise.jitter),
                 delays_db: of(|spread| spread.delay.0, late - signal),
                 gains_db: of(|spread| spread.gain, gains),
                 offsets_db: of(|spread| spread.offset, offsets),
             },
-            with_16_bits: (!self.noise_is_stated).then(|| db(all + noise)),
+            with_16_bits: (!self.noise_is_stated).then(|| db(all + noise.total())),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Figures against closed forms, against stored digits of another route, against the error system, and
 //! against virtual converters.
 
-use super::powers::{Conditions, target_power};
+use super::powers::{Conditions, NoisePowers, target_power};
 use super::reconstruction::Reconstruction;
 use super::snr::Ratios;
 use super::*;
@@ -61,10 +61,14 @@ const THESIS: System = System {
     band: 0.0,
 };
 
+fn white(power: &f64) -> NoisePowers {
+    NoisePowers { noise: *power, ..NoisePowers::default() }
+}
+
 /// Digits of theory by an independent program (white noise in the band, no converter noise): systems A, B,
 /// E, G and H of a set of twelve.
 #[test]
-fn simple_ways_have_the_digits_of_another_program() {
+fn usual_ways_have_the_digits_of_another_program() {
     let inf = f64::INFINITY;
     let case = |ratio, filter, delays, band, spline, interleaving, alone| {
         (System { ratio, latency: 24, filter, delays, band }, [Some(spline), interleaving, Some(alone)])
@@ -82,8 +86,8 @@ fn simple_ways_have_the_digits_of_another_program() {
         let channels = system.delays.len();
         let spread = vec![Deviations::default(); channels];
         let target = target_power(&signal);
-        let conditions = Conditions { signal, noise: vec![0.0; channels], spread };
-        let ways = simple::ways(&plain);
+        let conditions = Conditions { signal, noise: vec![NoisePowers::default(); channels], spread };
+        let ways = usual_ways::ways(&plain);
         let ratios: Vec<Ratios> = conditions
             .powers(&ways)
             .iter()
@@ -92,9 +96,9 @@ fn simple_ways_have_the_digits_of_another_program() {
                 ..Ratios::default()
             })
             .collect();
-        let figures = simple::figures(&ways, &ratios);
+        let figures = usual_ways::figures(&ways, &ratios, |_| None);
         let found = |way| figures.iter().find(|figure| figure.way == way).map(|figure| figure.snr_db.0);
-        let ways = [SimpleWay::CubicSpline, SimpleWay::Interleaving, SimpleWay::OneChannel];
+        let ways = [UsualWay::CubicSpline, UsualWay::Interleaving, UsualWay::OneChannel];
         for (way, want) in ways.into_iter().zip(want) {
             let got = found(way);
             let agree = match (got, want) {
@@ -145,10 +149,10 @@ fn errors_of_noise_and_of_uncertain_delays_have_the_digits_of_covariances() {
         let spread = [0.0, spread]
             .map(|delay| Deviations { delay: FastPeriods(delay), ..Deviations::default() })
             .to_vec();
-        let conditions = Conditions { signal, noise: plain.noise, spread };
+        let conditions = Conditions { signal, noise: plain.noise.iter().map(white).collect(), spread };
         let powers = conditions
             .powers(&[Reconstruction::Bank(FilterResponse::new(&bank.filters, bank.ratio).unwrap())])[0];
-        let rms = (powers.late + powers.noise).sqrt();
+        let rms = (powers.late + powers.noise.total()).sqrt();
         assert!((rms / want - 1.0).abs() < 1e-5, "{noise} {:?}: {rms} {want}", conditions.spread);
     }
 }
@@ -165,7 +169,7 @@ fn the_error_from_white_noise_is_that_of_the_error_system() {
         let target = target_power(&signal);
         let conditions = Conditions {
             signal,
-            noise: vec![1.0; bank.channel_count()],
+            noise: vec![white(&1.0); bank.channel_count()],
             spread: vec![Deviations::default(); bank.channel_count()],
         };
         let powers = conditions
@@ -173,7 +177,7 @@ fn the_error_from_white_noise_is_that_of_the_error_system() {
         let mean = analyze_mean(&bank).unwrap();
         let rms = powers.signal.sqrt();
         assert!((rms / mean.rms_error - 1.0).abs() < accuracy, "{rms} {}", mean.rms_error);
-        assert!((powers.noise.sqrt() / mean.noise_gain - 1.0).abs() < 1e-4);
+        assert!((powers.noise.total().sqrt() / mean.noise_gain - 1.0).abs() < 1e-4);
         let scale = crate::design::GammaScale::new(&bank, &[]).unwrap();
         assert!((target.sqrt() / scale.rms_reference - 1.0).abs() < accuracy);
     }
@@ -260,7 +264,7 @@ fn recursive_banks_have_the_figures_of_their_taps() {
 /// A bank of one channel is that channel alone.
 #[test]
 fn one_channel_is_not_compared_with_itself() {
-    use SimpleWay::{CubicSpline, Interleaving, LeastSquares, OneChannel, OwnCorrection};
+    use UsualWay::{CubicSpline, Interleaving, LeastSquares, OneChannel, OwnCorrection};
     for (ratio, delays, want) in [
         (1, &[0.0][..], &[Interleaving, CubicSpline, LeastSquares][..]),
         (2, &[0.0], &[CubicSpline, LeastSquares]),
@@ -268,7 +272,7 @@ fn one_channel_is_not_compared_with_itself() {
     ] {
         let system = System { ratio, latency: 6, filter: BUTTERWORTH_2, delays, band: 0.2 };
         let figures = Figures::new(&system.bank(FIR_24)).unwrap();
-        let found: Vec<SimpleWay> = figures.simple.iter().map(|figure| figure.way).collect();
+        let found: Vec<UsualWay> = figures.usual_ways.iter().map(|figure| figure.way).collect();
         assert_eq!(found.len(), want.len(), "{found:?}");
         assert!(want.iter().all(|way| found.contains(way)), "{found:?}");
         let Setup { ratio: m, channels, .. } = figures.setup;
@@ -283,14 +287,52 @@ fn own_corrections_leave_what_is_of_second_order() {
     let delays = &[3.01, 1.992, 1.009, 0.0];
     let system = System { ratio: 4, latency: 24, filter: RC, delays, band: 0.4 };
     let figures = Figures::new(&system.bank("{ method = \"fir\", taps = 64 }")).unwrap();
-    let found = |way| figures.simple.iter().find(|figure| figure.way == way).map(|figure| figure.snr_db.0);
-    let [plain, own, least] = [SimpleWay::Interleaving, SimpleWay::OwnCorrection, SimpleWay::LeastSquares]
+    let found =
+        |way| figures.usual_ways.iter().find(|figure| figure.way == way).map(|figure| figure.snr_db.0);
+    let [plain, own, least] = [UsualWay::Interleaving, UsualWay::OwnCorrection, UsualWay::LeastSquares]
         .map(|way| found(way).unwrap());
     println!("{plain} {own} {least}");
     assert!(own > 1.6 * plain && own < 2.4 * plain, "{plain} {own}");
     assert!(least > own + 10.0 && least >= figures.compared_snr().0 - 0.1, "{own} {least}");
-    assert_eq!(found(SimpleWay::CubicSpline), None);
-    assert_eq!(figures.simple.last().map(|figure| figure.way), Some(SimpleWay::LeastSquares));
+    assert_eq!(found(UsualWay::CubicSpline), None);
+    assert_eq!(figures.usual_ways.last().map(|figure| figure.way), Some(UsualWay::LeastSquares));
+}
+
+/// Two converters in turn of which one is late by s: a tone w has the image |tan(w s / 2)|.
+#[test]
+fn the_sfdr_of_plain_interleaving_is_that_of_its_skew() {
+    let system = System { ratio: 2, latency: 12, filter: RC, delays: &[1.02, 0.0], band: 0.4 };
+    let figures = Figures::new(&system.bank(FIR_24)).unwrap();
+    let plain = figures.usual_ways.iter().find(|figure| figure.way == UsualWay::Interleaving).unwrap();
+    let want = -20.0 * (0.5 * TAU * 0.4 * 0.02_f64).tan().log10();
+    assert!((plain.sfdr_db.unwrap().0 - want).abs() < 1e-6, "{plain:?} {want}");
+}
+
+/// Each source of noise by itself, and all parts together are the total.
+#[test]
+fn the_parts_of_the_ratio_are_its_sum() {
+    let system = System { ratio: 2, latency: 12, filter: BUTTERWORTH_2, delays: &[1.2, 0.1], band: 0.3 };
+    let quiet = system.bank(FIR_24);
+    let parts = |sources: [bool; 3]| {
+        let mut bank = quiet.clone();
+        for channel in &mut bank.spec.as_mut().unwrap().channels {
+            channel.bits = sources[0].then_some(10);
+            channel.noise = if sources[1] { 3e-4 } else { 0.0 };
+            channel.jitter = crate::units::Seconds(if sources[2] { 1e-3 } else { 0.0 });
+        }
+        Figures::new(&bank).unwrap().snr
+    };
+    let all = parts([true; 3]);
+    let [bits, noise, jitter] = [[true, false, false], [false, true, false], [false, false, true]].map(parts);
+    assert_eq!((bits.noise_db, noise.jitter_db, jitter.bits_db), (None, None, None));
+    for (of_all, alone) in
+        [(all.bits_db, bits.bits_db), (all.noise_db, noise.noise_db), (all.jitter_db, jitter.jitter_db)]
+    {
+        assert!((of_all.unwrap() - alone.unwrap()).0.abs() < 1e-3, "{all:?}");
+    }
+    let powers = [Some(all.signal_db), all.bits_db, all.noise_db, all.jitter_db];
+    let sum: f64 = powers.into_iter().flatten().map(|db| 10f64.powf(-0.1 * db.0)).sum();
+    assert!((all.total_db.0 + 10.0 * sum.log10()).abs() < 1e-3, "{all:?}");
 }
 
 /// The output of an FIR bank by its definition.
@@ -393,7 +435,7 @@ fn check_image(
     let measured = Decibels::of_amplitude(beside / lines[folded]).0;
     let plain = without_signal(bank.spec.as_ref().unwrap(), bank.latency).unwrap();
     let exact = vec![Deviations::default(); bank.channel_count()];
-    let tones = ToneResponse::new(&bank.filters, plain, exact).unwrap();
+    let tones = ToneResponse::of_bank(&bank.filters, plain, exact).unwrap();
     let there = tones.at(bin as f64 / length as f64);
     let predicted = Decibels::of_amplitude(there.image).0;
     println!("seed {seed}: image {measured:.3} dB, predicted {predicted:.3} dB");

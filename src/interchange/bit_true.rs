@@ -1,8 +1,8 @@
 //! Integer taps on integer samples, with the words of hardware.
 
 use super::ExportError;
-use super::error::check_straight;
 use super::layout::PolyphaseTaps;
+use super::straightening::{GUARD_BITS, Straightening};
 use crate::bank::{Bank, FixedPoint};
 
 /// Bits of the words. Samples and outputs have the same step, 1.
@@ -40,6 +40,9 @@ impl WordSizes {
 /// 2^-f of a step; subtracted from the samples they would be rounded to whole steps. Samples before the
 /// first frame are the offsets, rounded to whole steps.
 ///
+/// Where channels have nonlinearities, x_i is the word of a table: the sample without the curve of its
+/// channel, rounded to an eighth of a step. Then 8 x_i stands for x_i in the sums, and f + 3 for f.
+///
 /// ```
 /// use hybank::bank::{Bank, FixedPoint, SynthesisFilters};
 /// use hybank::interchange::{BitTrue, WordSizes};
@@ -57,8 +60,10 @@ impl WordSizes {
 #[derive(Debug, Clone)]
 pub struct BitTrue {
     pub(super) filters: IntegerFilters,
+    /// Of the sums.
     pub(super) fraction_bits: i32,
     pub(super) words: WordSizes,
+    pub(super) straightening: Option<Straightening>,
     /// The samples of the last `lags` frames, a ring.
     history: Vec<i64>,
     newest: usize,
@@ -76,26 +81,41 @@ impl BitTrue {
     pub fn new(bank: &Bank, words: WordSizes) -> Result<Self, ExportError> {
         let integers = bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format: "bit-true" })?;
         words.check()?;
-        let filters = IntegerFilters::new(bank, integers, Some(words.input))?;
-        filters.check_sums(words.input)?;
-        let (needed, accumulator) = (filters.needed_bits(words.input), words.accumulator);
-        if accumulator < needed && i64::from(accumulator) <= i64::from(integers.fraction_bits) {
-            let fraction_bits = integers.fraction_bits;
+        let straightening = Straightening::new(bank, words.input)?;
+        let guard_bits = if straightening.is_some() { GUARD_BITS } else { 0 };
+        let mut filters = IntegerFilters::new(bank, integers, Some(words.input + guard_bits))?;
+        if let Some(tables) = &straightening {
+            let rest = |(i, word): (usize, &mut i64)| *word = tables.word(i, tables.code(i, *word));
+            filters.resting.iter_mut().enumerate().for_each(rest);
+        }
+        let sample_bits = straightening.as_ref().map_or(words.input, |tables| tables.word_bits);
+        filters.check_sums(sample_bits)?;
+        let (needed, accumulator) = (filters.needed_bits(sample_bits), words.accumulator);
+        let fraction_bits = integers.fraction_bits + guard_bits as i32;
+        if accumulator < needed && i64::from(accumulator) <= i64::from(fraction_bits) {
             return Err(ExportError::NothingLeft { accumulator, fraction_bits, needed });
         }
         let history = filters.resting.repeat(filters.taps.lags);
-        let fraction_bits = integers.fraction_bits;
-        Ok(Self { filters, fraction_bits, words, history, newest: 0, wraps: 0, saturated: 0 })
+        Ok(Self { filters, fraction_bits, words, straightening, history, newest: 0, wraps: 0, saturated: 0 })
+    }
+
+    /// Bits of the samples that the filters take.
+    fn sample_bits(&self) -> u32 {
+        self.straightening.as_ref().map_or(self.words.input, |tables| tables.word_bits)
     }
 
     /// Bits of an accumulator that no sum can leave.
     pub fn needed_bits(&self) -> u32 {
-        self.filters.needed_bits(self.words.input)
+        self.filters.needed_bits(self.sample_bits())
     }
 
     /// The sample of each channel where there is no signal.
     pub fn resting(&self) -> Vec<i32> {
-        self.filters.resting.iter().map(|x| *x as i32).collect()
+        let code = |(i, word): (usize, &i64)| match &self.straightening {
+            Some(tables) => tables.code(i, *word) as i32,
+            None => *word as i32,
+        };
+        self.filters.resting.iter().enumerate().map(code).collect()
     }
 
     /// The M output samples of each of these frames of N samples, one of each channel.
@@ -112,7 +132,10 @@ impl BitTrue {
         let PolyphaseTaps { channels: n, lags, .. } = self.filters.taps;
         self.newest = self.newest.checked_sub(1).unwrap_or(lags - 1);
         let newest = &mut self.history[self.newest * n..][..n];
-        newest.iter_mut().zip(input).for_each(|(slot, x)| *slot = i64::from(*x));
+        for (i, (slot, x)) in newest.iter_mut().zip(input).enumerate() {
+            let code = i64::from(*x);
+            *slot = self.straightening.as_ref().map_or(code, |tables| tables.word(i, code));
+        }
         for (p, y) in output.iter_mut().enumerate() {
             let sum = self.wrapped(self.sum(p));
             *y = self.saturated(rounded(sum, self.fraction_bits));
@@ -197,7 +220,6 @@ impl IntegerFilters {
     /// # Errors
     /// [`ExportError::Offset`] without these bits, and [`ExportError::Words`].
     pub(super) fn new(bank: &Bank, words: &FixedPoint, input_bits: Option<u32>) -> Result<Self, ExportError> {
-        check_straight(bank)?;
         let nonzero = |(_, offset): &(usize, &f64)| **offset != 0.0;
         let full_scale = match (input_bits, bank.offsets.iter().enumerate().find(nonzero)) {
             (None, Some((i, &offset))) => return Err(ExportError::Offset { channel: i + 1, offset }),

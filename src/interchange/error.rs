@@ -36,14 +36,27 @@ pub enum ExportError {
         /// At most so many.
         most: u32,
     },
-    /// The bank corrects a nonlinearity, for which no format has a place.
+    /// The bank corrects a nonlinearity, for which the format has no place.
     #[error(
-        "channel {channel} has a nonlinearity, which only `fuse`, `stream`, Python and the C library correct; take it \
-         out of the spec, design the bank again, and correct the samples before the filters"
+        "channel {channel} has a nonlinearity, which only `fuse`, `stream`, Python, the C library and Verilog with \
+         constant taps correct; take it out of the spec, design the bank again, and correct the samples before the \
+         filters"
     )]
     Nonlinearity {
         /// Number of the channel, from 1.
         channel: usize,
+    },
+    /// A table of a nonlinearity would have very many words.
+    #[error(
+        "a nonlinearity is taken out of integers by a table with a word for each code; samples of {bits} bits have too \
+         many, {most} bits are the most. Use fewer bits, or take the nonlinearity out of the spec and correct the \
+         samples before the filters"
+    )]
+    TableBits {
+        /// Bits of the samples.
+        bits: u32,
+        /// Most bits.
+        most: u32,
     },
     /// Integer code needs the full scale to which an offset is relative.
     #[error(

@@ -29,6 +29,7 @@ mod error;
 mod layout;
 mod read_taps;
 mod sections;
+mod straightening;
 mod tables;
 mod verilog;
 
@@ -74,7 +75,9 @@ pub fn export(
     name: &str,
     input_bits: Option<u32>,
 ) -> Result<Vec<u8>, ExportError> {
-    check_straight(bank)?;
+    if format != Format::Verilog {
+        check_straight(bank)?;
+    }
     let is_code = matches!(format, Format::C99 | Format::Coe | Format::Mem | Format::Verilog);
     if input_bits.is_some() && !(is_code && bank.fixed_point.is_some()) {
         return Err(ExportError::NoWords);

@@ -9,7 +9,7 @@ fn fir() -> Bank {
     Bank::bare(SynthesisFilters::Fir(vec![vec![0.5, -0.25, 1.0], vec![0.0, 2.0, -1.5]]), 2)
 }
 
-fn integers(bits: u32, list: Vec<Vec<i64>>) -> Bank {
+pub(super) fn integers(bits: u32, list: Vec<Vec<i64>>) -> Bank {
     let words = FixedPoint { bits: WordLengths::Same(bits), fraction_bits: 2, integers: list };
     let mut bank = Bank::bare(SynthesisFilters::Fir(words.taps()), 2);
     bank.fixed_point = Some(words);

@@ -2,8 +2,7 @@
 
 use super::text::frequency;
 use crate::figures::{
-    BandSource, FigureBand, Figures, KeyFigures, NoiseSources, Setup, SimpleFigure, SimpleWay, Snr,
-    ToneFigure,
+    BandSource, FigureBand, Figures, KeyFigures, Setup, Snr, ToneFigure, UsualFigure, UsualWay,
 };
 use crate::spec::Method;
 use crate::units::{Decibels, Hertz};
@@ -29,16 +28,33 @@ const CUTOFFS: &str = "; uncertain cut-offs not counted";
 /// Ratios above this are rounding errors of double precision.
 const EXACT: Decibels = Decibels(270.0);
 
-/// Signal-to-noise ratio, images, error of gain, and the simple ways. In normalised time frequencies are
+/// Signal-to-noise ratio, images, error of gain, and the usual ways. In normalised time frequencies are
 /// shares of the output rate.
-pub fn figure_facts(figures: &Figures, is_normalised: bool) -> [Fact; 4] {
+pub fn figure_facts(figures: &Figures, is_normalised: bool) -> Vec<Fact> {
     let words = FigureTerms { figures, is_normalised };
-    [
-        fact("SNR", ratio(figures.snr.total_db), words.snr()),
+    let snr = fact("SNR", ratio(figures.snr.total_db), words.snr());
+    let rest = [
         words.image(),
         words.tone("gain error", figures.gain_error, "largest error of gain and phase of a tone"),
         words.comparison(),
-    ]
+    ];
+    std::iter::once(snr).chain(parts(&figures.snr)).chain(rest).collect()
+}
+
+/// What the SNR counts beside the error from the signal, each part by itself; nothing where that is all.
+fn parts(snr: &Snr) -> Option<Fact> {
+    let beside = [
+        ("bits", snr.bits_db),
+        ("noise", snr.noise_db),
+        ("jitter", snr.jitter_db),
+        ("uncertain delays", snr.delays_db),
+        ("uncertain gains", snr.gains_db),
+        ("uncertain offsets", snr.offsets_db),
+    ];
+    let beside: Vec<String> =
+        beside.into_iter().filter_map(|(part, db)| Some(format!("{part} {}", ratio(db?)))).collect();
+    let value = || format!("signal {}, {}", ratio(snr.signal_db), beside.join(", "));
+    (!beside.is_empty()).then(|| fact("parts", value(), "(each alone)"))
 }
 
 /// The signal-to-noise ratio and the largest image.
@@ -71,32 +87,21 @@ fn signed(db: Decibels) -> String {
     if text.starts_with('-') || text == "0.0 dB" { text } else { format!("+{text}") }
 }
 
-/// The converters' noise with what it is made of.
-fn noise_of(NoiseSources { bits, noise, jitter }: NoiseSources) -> String {
-    let parts: Vec<&str> = [("bits", bits), ("noise", noise), ("jitter", jitter)]
-        .into_iter()
-        .filter_map(|(part, is_stated)| is_stated.then_some(part))
-        .collect();
-    match parts[..] {
-        [] => "the converters' noise".to_owned(),
-        _ => format!("the converters' noise ({})", parts.join(", ")),
-    }
-}
-
 /// The way in words. No filter of one channel, however long, is better than what stands for one channel.
-fn named(figure: &SimpleFigure) -> String {
+fn named(figure: &UsualFigure) -> String {
     match (figure.way, figure.channel) {
-        (SimpleWay::OneChannel, Some(channel)) => format!("channel {channel} alone at best"),
-        (SimpleWay::OneChannel, None) => "one channel alone at best".to_owned(),
-        (SimpleWay::Interleaving, _) => "plain interleaving".to_owned(),
-        (SimpleWay::OwnCorrection, _) => "each channel corrected by itself with 32 taps".to_owned(),
-        (SimpleWay::CubicSpline, _) => "a cubic spline".to_owned(),
-        (SimpleWay::LeastSquares, _) => "least-squares taps of this length".to_owned(),
+        (UsualWay::OneChannel, Some(channel)) => format!("channel {channel} alone at best"),
+        (UsualWay::OneChannel, None) => "one channel alone at best".to_owned(),
+        (UsualWay::Interleaving, _) => "plain interleaving".to_owned(),
+        (UsualWay::OwnCorrection, _) => "each channel corrected by itself with 32 taps".to_owned(),
+        (UsualWay::CubicSpline, _) => "a cubic spline".to_owned(),
+        (UsualWay::LeastSquares, _) => "least-squares taps of this length".to_owned(),
     }
 }
 
-fn with_ratio(figure: &SimpleFigure) -> String {
-    format!("{} ({})", named(figure), ratio(figure.snr_db))
+fn with_ratios(figure: &UsualFigure) -> String {
+    let sfdr = figure.sfdr_db.map_or_else(String::new, |db| format!(", SFDR {}", ratio(db)));
+    format!("{} ({}{sfdr})", named(figure), ratio(figure.snr_db))
 }
 
 struct FigureTerms<'a> {
@@ -115,9 +120,7 @@ impl FigureTerms<'_> {
     }
 
     fn snr(&self) -> String {
-        let Figures { snr, snr_16_bits_db, band: FigureBand { source, .. }, any_input, setup, .. } =
-            self.figures;
-        let Snr { signal_db, noise_db, delays_db, gains_db, offsets_db, .. } = *snr;
+        let Figures { snr_16_bits_db, band: FigureBand { source, .. }, any_input, setup, .. } = self.figures;
         let input = match (source, any_input) {
             (BandSource::Signal, _) => format!("for white noise in {}", self.band()),
             (BandSource::Target, Some(_)) => "for the spectrum of the spec's signal".to_owned(),
@@ -125,24 +128,10 @@ impl FigureTerms<'_> {
                 "for white noise at all frequencies: the spec does not say where the signal lies".to_owned()
             }
         };
-        let noise = noise_of(setup.noise);
-        let parts: Vec<String> = [
-            (&*noise, noise_db),
-            ("uncertain delays", delays_db),
-            ("uncertain gains", gains_db),
-            ("uncertain offsets", offsets_db),
-        ]
-        .into_iter()
-        .filter_map(|(part, db)| db.map(|db| format!(", {part} {}", ratio(db))))
-        .collect();
-        let parts = match parts.is_empty() {
-            true => String::new(),
-            false => format!("; from the signal {}{}", ratio(signal_db), parts.concat()),
-        };
         let bits =
             snr_16_bits_db.map_or_else(String::new, |db| format!("; {} with 16-bit converters", rounded(db)));
         let cutoffs = if setup.has_uncertain_cutoffs { CUTOFFS } else { "" };
-        format!("{input}{parts}{bits}{cutoffs}")
+        format!("{input}{bits}{cutoffs}")
     }
 
     /// What of the spec's uncertainty is in the figures of a tone, and what is not.
@@ -199,31 +188,31 @@ impl FigureTerms<'_> {
         )
     }
 
-    /// The bank beside the best simple way, and the other ways.
+    /// The bank beside the best usual way, and the other ways.
     fn comparison(&self) -> Fact {
-        let Some((best, others)) = self.figures.simple.split_first() else {
+        let Some((best, others)) = self.figures.usual_ways.split_first() else {
             return fact("compared", "unknown", "");
         };
-        let Some(gain) = self.figures.gain_over_simple() else { return fact("compared", "unknown", "") };
+        let Some(gain) = self.figures.gain_over_usual_ways() else { return fact("compared", "unknown", "") };
         let verdict = if self.figures.is_worthwhile() {
-            format!("over {}", with_ratio(best))
+            format!("over {}", with_ratios(best))
         } else {
-            format!("against {}: this bank does not pay; {}", with_ratio(best), self.advice(best))
+            format!("against {}: this bank does not pay; {}", with_ratios(best), self.advice(best))
         };
-        let rest: Vec<String> = others.iter().map(with_ratio).collect();
+        let rest: Vec<String> = others.iter().map(with_ratios).collect();
         let rest = if rest.is_empty() { String::new() } else { format!("; {}", rest.join(", ")) };
         let bits = self.figures.snr_16_bits_db.map_or("", |_| "; all with 16-bit converters");
         fact("compared", signed(gain), format!("{verdict}{rest}{bits}"))
     }
 
     /// What to do where the bank does not pay.
-    fn advice(&self, best: &SimpleFigure) -> String {
+    fn advice(&self, best: &UsualFigure) -> String {
         let place = match self.figures.band.source {
             BandSource::Signal => "band",
             BandSource::Target => "signal",
         };
         let why = match (best.way, self.figures.snr_16_bits_db) {
-            (SimpleWay::OneChannel, Some(_)) => format!(
+            (UsualWay::OneChannel, Some(_)) => format!(
                 "with 16-bit converters (assumed) one channel with a filter of any length would do as well for this \
                  {place}; "
             ),
@@ -232,17 +221,17 @@ impl FigureTerms<'_> {
         format!("{why}use that, or {}", self.remedy(best.way))
     }
 
-    /// What may make the bank better than a simple way, and is not done yet.
-    fn remedy(&self, best: SimpleWay) -> &'static str {
+    /// What may make the bank better than a usual way, and is not done yet.
+    fn remedy(&self, best: UsualWay) -> &'static str {
         let Figures { any_input, snr_16_bits_db, setup, .. } = self.figures;
         let noise_is_stated = snr_16_bits_db.is_none();
         match (best, noise_is_stated, setup.method) {
             _ if any_input.is_none() => "say in [signal] where the signal lies",
-            (SimpleWay::OneChannel, false, Method::H2) => "state the `noise` of the converters",
-            (SimpleWay::OneChannel, false, _) => {
+            (UsualWay::OneChannel, false, Method::H2) => "state the `noise` of the converters",
+            (UsualWay::OneChannel, false, _) => {
                 "state the `noise` of the converters and design with the method h2"
             }
-            (SimpleWay::OneChannel, true, method) if method != Method::H2 => "design with the method h2",
+            (UsualWay::OneChannel, true, method) if method != Method::H2 => "design with the method h2",
             _ if setup.is_recursive => "give the bank more latency",
             _ => "give the bank more latency and taps",
         }
@@ -258,7 +247,8 @@ mod tests {
     }
 
     fn figures(total: f64, spline: f64) -> Figures {
-        let simple = |way, channel, total| SimpleFigure { way, channel, snr_db: Decibels(total) };
+        let usual =
+            |way, channel, total, sfdr_db| UsualFigure { way, channel, snr_db: Decibels(total), sfdr_db };
         Figures {
             band: FigureBand { low_hertz: Hertz(0.0), high_hertz: Hertz(9e3), source: BandSource::Signal },
             snr: snr(total),
@@ -267,9 +257,9 @@ mod tests {
             image_at_worst: None,
             gain_error: Some(ToneFigure { db: Decibels(f64::NEG_INFINITY), hertz: Hertz(0.0) }),
             target_vanishes: false,
-            simple: vec![
-                simple(SimpleWay::CubicSpline, None, spline),
-                simple(SimpleWay::OneChannel, Some(2), 20.0),
+            usual_ways: vec![
+                usual(UsualWay::CubicSpline, None, spline, Some(Decibels(45.0))),
+                usual(UsualWay::OneChannel, Some(2), 20.0, None),
             ],
             any_input: Some(0.9),
             setup: Setup {
@@ -277,15 +267,22 @@ mod tests {
                 is_recursive: false,
                 ratio: 2,
                 channels: 2,
-                noise: NoiseSources::default(),
                 has_uncertain_cutoffs: false,
             },
         }
     }
 
+    #[test]
+    fn an_snr_of_several_parts_names_them() {
+        let snr = Snr { bits_db: Some(Decibels(72.04)), delays_db: Some(Decibels(80.0)), ..snr(98.0) };
+        let all = lines(&Figures { snr, ..figures(98.0, 48.0) });
+        let want = "parts: signal 98.0 dB, bits 72.0 dB, uncertain delays 80.0 dB, (each alone)";
+        assert_eq!((all.len(), &*all[1]), (5, want));
+    }
+
     fn lines(figures: &Figures) -> Vec<String> {
         let line = |Fact { name, value, meaning }: Fact| format!("{name}: {value}, {meaning}");
-        figure_facts(figures, false).map(line).into()
+        figure_facts(figures, false).into_iter().map(line).collect()
     }
 
     #[test]
@@ -296,7 +293,7 @@ mod tests {
                 "SNR: 132.9 dB, for white noise in 0 to 9 kHz; 89.0 dB with 16-bit converters",
                 "SFDR: 98.8 dB, to the largest image of a tone in 0 to 9 kHz, at 8.5 kHz",
                 "gain error: none, below the rounding of double precision in 0 to 9 kHz",
-                "compared: +41.0 dB, over a cubic spline (48.0 dB); channel 2 alone at best \
+                "compared: +41.0 dB, over a cubic spline (48.0 dB, SFDR 45.0 dB); channel 2 alone at best \
                  (20.0 dB); all with 16-bit converters",
             ]
         );
@@ -311,8 +308,9 @@ mod tests {
             (47.98, 48.0, "0.0 dB"),
         ] {
             let line = lines(&figures(own, best)).pop().unwrap();
-            let verdict =
-                format!("compared: {value}, against a cubic spline ({best:.1} dB): this bank does not pay;");
+            let verdict = format!(
+                "compared: {value}, against a cubic spline ({best:.1} dB, SFDR 45.0 dB): this bank does not pay;"
+            );
             assert!(line.starts_with(&verdict), "{line}");
             assert!(line.contains(" use that, or give the bank more latency and taps;"), "{line}");
             let unknown = Figures { any_input: None, ..figures(own, best) };
@@ -334,14 +332,17 @@ mod tests {
             (Method::H2, false, true, "use that, or give the bank more latency and taps; ".to_owned()),
         ] {
             let mut figures = figures(68.3, 40.0);
-            figures.simple.swap(0, 1);
-            figures.simple[0].snr_db = Decibels(70.3);
+            figures.usual_ways.swap(0, 1);
+            figures.usual_ways[0].snr_db = Decibels(70.3);
             figures.setup = Setup { method, is_recursive, ..figures.setup };
             figures.snr_16_bits_db = figures.snr_16_bits_db.filter(|_| !noise_is_stated);
             let line = lines(&figures).pop().unwrap();
             let start =
                 "compared: -2.0 dB, against channel 2 alone at best (70.3 dB): this bank does not pay; ";
-            assert!(line.starts_with(&format!("{start}{advice}a cubic spline (40.0 dB)")), "{line}");
+            assert!(
+                line.starts_with(&format!("{start}{advice}a cubic spline (40.0 dB, SFDR 45.0 dB)")),
+                "{line}"
+            );
         }
         let mut figures = figures(42.7, 48.0);
         figures.setup.is_recursive = true;

@@ -249,6 +249,35 @@ fn lost_samples_of_a_signal_are_estimated_as_well_as_predicted() {
     assert!(ratio(&clean) > 85.0, "{}", ratio(&clean));
 }
 
+/// Gain and offset of the second channel change; with them in the table the result is that without.
+fn follow_levels(desk: &Desk, steady: &[f32]) {
+    let level = |frame: usize| {
+        let time = (frame as f64 / 24e3).min(2.0);
+        (1.0 + 0.03 * time, 0.01 - 0.004 * time)
+    };
+    let moved = |(frame, x): (usize, &f32)| {
+        let (gain, offset) = level(frame);
+        (gain * f64::from(*x) + offset) as f32
+    };
+    let channel: Vec<f32> = wav::samples(desk, "cap/ch2.wav").iter().enumerate().map(moved).collect();
+    wav::write(desk, "moved.wav", 1, 24_000, &channel);
+    desk.write(
+        "levels.csv",
+        "time,a,b,gain a,gain b,offset a,offset b\n0,0,1e-5,1,1,0,0.01\n2,0,2e-5,1,1.06,0,0.002\n",
+    );
+    let args = ["fuse", "bank.json", "cap/ch1.wav", "moved.wav", "-o", "m.wav", "--track", "levels.csv"];
+    let report = desk.report(&args);
+    assert!((report["levels"]["gain"].as_f64().unwrap() - 0.06).abs() < 1e-12, "{report}");
+    assert!((report["levels"]["offset"].as_f64().unwrap() - 0.008).abs() < 1e-12, "{report}");
+    let followed = wav::samples(desk, "m.wav");
+    let error = followed.iter().zip(steady).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    assert!(followed.len() == steady.len() && error < 1e-6, "{error}");
+    let said = desk.good(&[&args[..], &["--force"]].concat());
+    assert!(said.contains("gains change by up to 6.000 %, offsets by up to 8.00e-3"), "{said}");
+    desk.write("zero.csv", "time,a,b,gain a,gain b\n0,0,1e-5,1,0\n");
+    desk.refused(1, &[&args[..7], &["zero.csv", "--force"]].concat(), &["zero.csv", "gain of channel 2"]);
+}
+
 /// Clocks that drift by 5 ppm over 2 s: the taps follow the delays of a table, of either kind.
 #[test]
 fn a_table_of_delays_is_followed() {
@@ -290,6 +319,7 @@ fn a_table_of_delays_is_followed() {
     }
     // A stream gives the same samples, whatever it reads at a time.
     let fused = wav::samples(&desk, "y.wav");
+    follow_levels(&desk, &fused);
     let files = ["--input", "cap/ch1.wav", "--input", "cap/ch2.wav", "--format", "wav"];
     let report = desk
         .report(&[&["stream", "bank.json", "-o", "s.wav", "--track", "drift.jsonl"], &files[..]].concat());

@@ -48,9 +48,13 @@ fn four(folder: &str) -> [String; 4] {
 
 /// SFDR of a tone that `bank.json` fuses.
 fn sfdr(desk: &Desk) -> f64 {
+    sfdr_by(desk, &[])
+}
+
+fn sfdr_by(desk: &Desk, more: &[&str]) -> f64 {
     let files = four("judged");
     let names = files.each_ref().map(String::as_str);
-    desk.good(&[&["fuse", "bank.json"][..], &names, &["-o", "fused.wav", "--force"]].concat());
+    desk.good(&[&["fuse", "bank.json"][..], &names, &["-o", "fused.wav", "--force"], more].concat());
     number(&desk.json(&["measure", "fused.wav", "--skip", "500", "--json"]), "/sfdr_db")
 }
 
@@ -87,6 +91,11 @@ fn a_nonlinearity_of_half_a_step_is_found_and_taken_out() {
     let after = sfdr(&desk);
     println!("SFDR {before:.1} dB without, {after:.1} dB with the nonlinearity");
     assert!(after > before + 15.0, "{before} {after}");
+    // Tables of words have the same curves.
+    desk.good(&["design", "straight.toml", "-o", "bank.json", "--bits", "16", "--no-proof", "--force"]);
+    let by_tables = sfdr_by(&desk, &["--bit-true"]);
+    println!("{by_tables:.1} dB with integers");
+    assert!((by_tables - after).abs() < 2.0, "{by_tables} {after}");
     // Curves have no place in other tools.
     let refused = desk.run(&["export", "bank.json", "--format", "c", "-o", "bank.h"], &[]);
     assert!(!refused.status.success() && String::from_utf8_lossy(&refused.stderr).contains("nonlinearity"));

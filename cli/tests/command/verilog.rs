@@ -289,6 +289,42 @@ fn a_loadable_module_depends_on_no_tap() {
     }
 }
 
+/// A channel with a nonlinearity, one with none: the bits of the model for all codes, in a clean module, with
+/// a wrong word of a table found.
+#[test]
+fn tables_take_out_nonlinearities() {
+    let desk = Desk::empty();
+    let mut bank = bank_of_integers(vec![vec![5, -3, 0, 8, -16, 5], vec![-127, 0, 0, 127, 3, -1]], 8, 6, 2);
+    (bank.offsets, bank.nonlinearity) = (vec![0.03, -0.02], vec![vec![0.01, -0.004], Vec::new()]);
+    desk.write("b.json", bank.to_json().unwrap());
+    for flags in
+        [&[][..], &["--clocks-per-frame", "3"], &["--frames-per-clock", "2"], &["--accumulator", "16"]]
+    {
+        let report = exported(&desk, &[&["--input-bits", "8"], flags].concat());
+        let core = text(&desk.read("core.v"));
+        if let Some((is_good, said)) = tool(&desk, &["verilator", "--lint-only", "-Wall", "core.v"]) {
+            assert!(is_good && said.is_empty(), "{flags:?}: {said}");
+        }
+        let Some(said) = simulated(&desk) else { return };
+        assert!(said.contains("PASS") && !said.contains("FAIL"), "{flags:?} {report}: {said}");
+        assert!(number(&report, "/rom_bits") >= 256.0 * 11.0, "{report}");
+        let word = core.lines().find(|line| line.contains("straight1[77] = ")).unwrap();
+        desk.write("core.v", core.replace(word, "straight1[77] = 12'sd0;"));
+        assert!(simulated(&desk).unwrap().contains("FAIL"), "{flags:?}");
+    }
+    let script = "read_verilog core.v; proc; opt; memory_collect; select -assert-count 1 t:$mem*; memory -nomap; check -assert";
+    exported(&desk, &["--input-bits", "8"]);
+    if let Some((is_good, said)) = tool(&desk, &["yosys", "-q", "-p", script]) {
+        assert!(is_good, "{said}");
+    }
+    for (flags, words) in [
+        (&["--input-bits", "8", "--loadable"][..], "Verilog with constant taps"),
+        (&["--input-bits", "15"], "14 bits are the most"),
+    ] {
+        desk.refused(1, &[&["export", "b.json", "-o", "no.v"], flags].concat(), &[words]);
+    }
+}
+
 #[test]
 fn bits_that_hold_all_sums_are_the_least() {
     for (tap, bits) in [(1, 8), (-1, 9), (2, 9), (-2, 10), (3, 10)] {

@@ -173,7 +173,7 @@ pub(super) fn check_jitter(periods: FastPeriods, seconds: f64) -> Result<(), Spe
 }
 
 /// g_i.
-pub(crate) fn check_gain(gain: f64) -> Result<(), SpecProblem> {
+pub fn check_gain(gain: f64) -> Result<(), SpecProblem> {
     if (1.0 / MAX_GAIN..=MAX_GAIN).contains(&gain.abs()) {
         return Ok(());
     }

@@ -38,9 +38,9 @@ pub use filter_rules::MAX_ORDER;
 pub use fitting::{Cutoff, Fitting, UnknownFitting};
 pub use frames::{FrameLayout, FrameSample};
 pub use limits::{MAX_CHANNELS, MAX_LATENCY, MAX_OPTIMISED_TAPS, MAX_RATIO, MAX_TAPS};
-pub(crate) use limits::{MAX_ENTRY, check_channel_count, check_fast_period, check_gain, check_ratio};
+pub(crate) use limits::{MAX_ENTRY, check_channel_count, check_fast_period, check_ratio};
 pub use limits::{MAX_REDUCTION_LOSS_DB, MAX_STATES, MAX_TARGET_DB};
-pub use limits::{check_noise, check_nonlinearity, check_offset, within};
+pub use limits::{check_gain, check_noise, check_nonlinearity, check_offset, within};
 pub use one_or_each::OneOrEach;
 pub use passband::Passband;
 pub(crate) use reading::refusal;
@@ -162,11 +162,14 @@ impl ChannelSpec {
         x - hybank_runtime::nonlinearity(&self.nonlinearity, x)
     }
 
-    /// Rms of the noise and of the rounding together, relative to full scale: a step of 2^(1 - bits) is an
-    /// error of step / sqrt(12).
+    /// Rms of the noise and of the rounding together, relative to full scale.
     pub fn sample_noise(&self) -> f64 {
-        let rounding = self.bits.map_or(0.0, |bits| 2f64.powi(1 - bits as i32) / 12f64.sqrt());
-        self.noise.hypot(rounding)
+        self.noise.hypot(self.rounding())
+    }
+
+    /// Rms of the rounding: a step of 2^(1 - bits) is an error of step / sqrt(12).
+    pub fn rounding(&self) -> f64 {
+        self.bits.map_or(0.0, |bits| 2f64.powi(1 - bits as i32) / 12f64.sqrt())
     }
 }
 

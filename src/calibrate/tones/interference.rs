@@ -93,28 +93,31 @@ fn widen(tone: &mut TonePhasors, reference: usize, variance: impl Fn(usize) -> f
 
 /// The variance of the mean instant of each converter, fast periods squared, as far as jitter makes it: what
 /// is left of a sample has the variance a + b v^2 with v the slope of the tones, and least squares give b.
-/// None of complex samples, whose two parts have their slopes in turn.
+/// Both parts of a complex sample have the instant in common.
 pub(super) fn jitter(sines: &SineFit, captures: &ToneRecords<'_>, ratio: usize) -> Vec<f64> {
     let of_record = |i: usize| {
-        let (part, record) = (captures.parts(i).start, &captures.records[i]);
-        let residual = sines.residual(part, &record.samples);
-        let slopes = sines.slopes(part, record.samples.len());
-        let kept = || residual.iter().zip(&slopes).zip(&record.keep).filter(|(_, keep)| **keep);
-        let count = kept().count().max(1) as f64;
+        let record = &captures.records[i];
+        let part = |(part, samples): (usize, &[f64])| {
+            let (residual, slopes) = (sines.residual(part, samples), sines.slopes(part, samples.len()));
+            let all = residual.into_iter().zip(slopes).zip(&record.keep);
+            all.filter(|(_, keep)| **keep).map(|(both, _)| both).collect::<Vec<_>>()
+        };
+        let kept: Vec<(f64, f64)> = captures.parts(i).zip(record.parts()).flat_map(part).collect();
+        let count = kept.len().max(1) as f64;
         let mean =
-            |of: &dyn Fn(f64, f64) -> f64| kept().map(|((r, v), _)| of(r * r, v * v)).sum::<f64>() / count;
+            |of: &dyn Fn(f64, f64) -> f64| kept.iter().map(|(r, v)| of(r * r, v * v)).sum::<f64>() / count;
         let (noise, slope) = (mean(&|r, _| r), mean(&|_, v| v));
         let shared = mean(&|r, v| (r - noise) * (v - slope));
         let spread = mean(&|_, v| (v - slope).powi(2));
-        if spread > 0.0 { (shared / spread).max(0.0) / count } else { 0.0 }
+        let instants = count / captures.parts(i).len() as f64;
+        if spread > 0.0 { (shared / spread).max(0.0) / instants } else { 0.0 }
     };
     let of_converter = |converter| {
         let records = captures.records_of(converter);
         let share = (ratio as f64 / records.len() as f64).powi(2);
         records.map(of_record).sum::<f64>() * share
     };
-    let converters = 0..captures.converters();
-    if captures.is_complex { vec![0.0; converters.len()] } else { converters.map(of_converter).collect() }
+    (0..captures.converters()).map(of_converter).collect()
 }
 
 /// What the samples repeat: as many values as there are phases, of which a fit takes so many out.

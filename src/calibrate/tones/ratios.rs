@@ -56,6 +56,7 @@ pub(super) struct RatioFit<'a> {
     /// The standard deviation of the logarithm of the reference's cut-off, if it is known from elsewhere.
     stated: Option<f64>,
     tones: Vec<ToneEquations<'a>>,
+    is_complex: bool,
 }
 
 /// The values, and how well the tones agree with them.
@@ -166,7 +167,8 @@ impl<'a> RatioFit<'a> {
         let tones = all.iter().flat_map(|tones| tones.measured.iter().map(|tone| one(tone, &tones.jitter)));
         let (tones, point) =
             (tones.collect(), ChannelValues::nominal(model, settings.fit, settings.reference));
-        Self { model, settings, others, point, stated: None, tones }
+        let is_complex = all.iter().all(|tones| tones.is_complex);
+        Self { model, settings, others, point, stated: None, tones, is_complex }
     }
 
     /// The same with the cut-off of the reference, from a solution without it: equal filters do not tell it.
@@ -241,7 +243,9 @@ impl<'a> RatioFit<'a> {
     /// v / N (2 w_t w_u - 3/2 w_t^2 [t = u])     and the magnitudes   -v / N 1/2 w_t^2 [t = u]
     /// ```
     ///
-    /// more than white noise gives them: jitter is also a delay that all tones have in common.
+    /// more than white noise gives them: jitter is also a delay that all tones have in common. Of complex
+    /// samples it is 3/2 w_t w_u - w_t^2 [t = u] for the phases. What their magnitudes have in common is
+    /// left out, which makes no interval shorter.
     fn of_jitter(&self) -> Mat {
         let (count, others) = (self.point.parameters.len(), self.others.len());
         let mut sum = Mat::zeros(count, count);
@@ -255,7 +259,11 @@ impl<'a> RatioFit<'a> {
             });
             let effects = rows.columns(0, count).transpose() * whitening * sources * of.w;
             let channels = self.others.iter().chain([&self.settings.reference]);
-            let share = if are_phases { -1.5 } else { -0.5 };
+            let share = match (are_phases, self.is_complex) {
+                (false, _) => -0.5,
+                (true, false) => -1.5,
+                (true, true) => -1.0,
+            };
             for (k, &channel) in channels.enumerate() {
                 let effect = effects.column(k);
                 sum += effect * effect.transpose() * (share * of.jitter[channel]);
@@ -267,10 +275,11 @@ impl<'a> RatioFit<'a> {
                 }
             }
         }
+        let share = if self.is_complex { 1.5 } else { 2.0 };
         for (jitter, effects) in common {
             for (k, &channel) in self.others.iter().chain([&self.settings.reference]).enumerate() {
                 let effect = effects.column(k);
-                sum += effect * effect.transpose() * (2.0 * jitter[channel]);
+                sum += effect * effect.transpose() * (share * jitter[channel]);
             }
         }
         sum

@@ -91,7 +91,7 @@ fn uncertain_values_count_as_converters_that_are_off() {
         println!("{errors:?}: SNR {:.2} dB simulated, {:.2} dB predicted", found.0, told.0);
         assert!((found - told).0.abs() < 0.5, "{errors:?}: {found:?} {told:?}");
         let spread = Deviations::of_spec(case.bank.spec.as_ref().unwrap());
-        let tones = ToneResponse::new(&case.bank.filters, case.plain, spread).unwrap();
+        let tones = ToneResponse::of_bank(&case.bank.filters, case.plain, spread).unwrap();
         let there = tones.at(bin as f64 / (2 * FRAMES) as f64);
         for (power, told) in [(image, there.image), (gains, there.gain_error)] {
             let found = power.sqrt();
@@ -116,7 +116,7 @@ fn the_worst_image_is_that_of_a_corner() {
         channel.delay = channel.delay.moved_by(FastPeriods(errors.delay * sign(0)));
         channel.gain *= 1.0 + errors.gain * sign(1);
         let exact = vec![Deviations::default(); 2];
-        let tones = ToneResponse::new(&bank.filters, moved, exact).unwrap();
+        let tones = ToneResponse::of_bank(&bank.filters, moved, exact).unwrap();
         Decibels::of_amplitude(tones.worst(band).image.unwrap().image).0
     };
     let worst = (0..4).map(corner).fold(f64::NEG_INFINITY, f64::max);

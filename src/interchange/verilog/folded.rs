@@ -5,6 +5,7 @@
 use super::load::LoadPort;
 use super::netlist::{Netlist, ShiftedWord, Word, constant, wrapped};
 use super::output::OutputRounding;
+use super::tables::Samples;
 use crate::interchange::bit_true::{IntegerFilters, Range};
 use crate::interchange::layout::PolyphaseTaps;
 use std::collections::BTreeMap;
@@ -53,10 +54,11 @@ pub(super) fn folded(
     filters: &IntegerFilters,
     schedule: &Schedule,
     mut port: Option<&mut LoadPort>,
-    bits: u32,
+    samples: &Samples,
     output: OutputRounding,
 ) -> (usize, usize) {
-    write_history(netlist, filters, schedule, port.as_deref_mut(), bits);
+    let bits = samples.bits;
+    write_history(netlist, filters, schedule, port.as_deref_mut(), samples);
     let mut rom = Rom { cases: vec![String::new(); schedule.clocks], bits: 0, products: BTreeMap::new() };
     let mut products = vec![Vec::new(); filters.taps.ratio];
     for (m, samples) in schedule.samples.chunks(schedule.clocks).enumerate() {
@@ -149,8 +151,9 @@ fn write_history(
     filters: &IntegerFilters,
     schedule: &Schedule,
     mut port: Option<&mut LoadPort>,
-    bits: u32,
+    samples: &Samples,
 ) {
+    let bits = samples.bits;
     let (mut reset, mut shift) = (String::new(), String::new());
     for i in 0..filters.taps.channels {
         let lags = schedule.lags(i);
@@ -163,10 +166,13 @@ fn write_history(
         };
         for j in 0..lags {
             let name = format!("x{}_{j}", i + 1);
-            let before = j.checked_sub(1).map_or_else(String::new, |j| format!("_{j}"));
+            let before = match j {
+                0 => samples.texts[i].clone(),
+                _ => format!("x{}_{}", i + 1, j - 1),
+            };
             netlist.declare_register(&name, bits);
             let _ = writeln!(reset, "            {name} <= {resting};");
-            let _ = writeln!(shift, "            {name} <= x{}{before};", i + 1);
+            let _ = writeln!(shift, "            {name} <= {before};");
         }
     }
     let _ = write!(

@@ -9,11 +9,13 @@ mod load;
 mod netlist;
 mod output;
 mod parallel;
+mod tables;
 mod testbench;
 
 use super::bit_true::{BitTrue, IntegerFilters, WordSizes};
 use super::c99;
-use super::error::ExportError;
+use super::error::{ExportError, check_straight};
+use super::straightening::{GUARD_BITS, Straightening};
 use crate::bank::{Bank, FixedPoint};
 use crate::spec::WordLengths;
 use folded::{Schedule, folded};
@@ -22,6 +24,7 @@ use netlist::Netlist;
 use output::OutputRounding;
 use parallel::parallel;
 use std::num::NonZeroU32;
+use tables::Samples;
 pub use testbench::MOST_RANDOM_FRAMES;
 
 /// The circuit that is wanted. The default takes a frame at every clock, and has a register after every
@@ -95,7 +98,8 @@ pub struct Circuit {
     pub adders: usize,
     /// Bits of all registers.
     pub registers: usize,
-    /// Bits of the coefficients, where multipliers serve several taps or the coefficients are loaded.
+    /// Bits of the coefficients, where multipliers serve several taps or the coefficients are loaded, and of
+    /// the tables of nonlinearities.
     pub rom_bits: usize,
     /// Words of a bank that are loaded; 0 where the circuit holds one bank for ever.
     pub load_words: usize,
@@ -137,12 +141,15 @@ impl Verilog {
         let integers = bank.fixed_point.as_ref().ok_or(ExportError::NoIntegers { format: "Verilog" })?;
         let words = options.words(bank)?;
         options.check_clocks()?;
+        if options.is_loadable {
+            check_straight(bank)?;
+        }
         let model = BitTrue::new(bank, words)?;
         let (frames, clocks) =
             (options.frames_per_clock.get() as usize, options.clocks_per_frame.get() as usize);
         let filters = &model.filters.modulo(words.accumulator).of_blocks(frames);
         let mut netlist = Netlist::new(options.pipeline.get(), words.accumulator);
-        let output = OutputRounding::new(words.output, integers.fraction_bits);
+        let output = OutputRounding::new(words.output, model.fraction_bits);
         let loaded =
             options.is_loadable.then(|| LoadPort::new(integers, bank.ratio, frames, clocks, words.input));
         let (mut port, schedule) = match loaded.transpose()? {
@@ -150,9 +157,12 @@ impl Verilog {
             None => (None, (clocks > 1).then(|| Schedule::new(&filters.taps, clocks))),
         };
         let needed = port.as_ref().map_or_else(|| model.needed_bits(), LoadPort::needed_bits);
+        let tables = model.straightening.as_ref();
+        tables.map_or(Ok(()), Straightening::check_circuit)?;
+        let samples = Samples::new(&mut netlist, filters.taps.channels, words.input, tables);
         let (latency_clocks, rom_bits) = match &schedule {
-            None => (parallel(&mut netlist, filters, words.input, output), 0),
-            Some(schedule) => folded(&mut netlist, filters, schedule, port.as_mut(), words.input, output),
+            None => (parallel(&mut netlist, filters, &samples, output), 0),
+            Some(schedule) => folded(&mut netlist, filters, schedule, port.as_mut(), &samples, output),
         };
         let circuit = Circuit {
             latency_clocks,
@@ -161,7 +171,7 @@ impl Verilog {
             multipliers: netlist.multipliers,
             adders: netlist.adders,
             registers: netlist.registers,
-            rom_bits,
+            rom_bits: rom_bits + tables.map_or(0, Straightening::bits),
             load_words: port.as_ref().map_or(0, LoadPort::word_count),
             load_data_bits: port.as_ref().map_or(0, LoadPort::data_bits),
             needed_accumulator_bits: needed,
@@ -255,7 +265,7 @@ fn about(bank: &Bank, model: &BitTrue, words: WordSizes, circuit: &Circuit, layo
         },
         bank.latency,
         c99::gammas(bank),
-        arithmetic(model, words, circuit.needed_accumulator_bits),
+        arithmetic(bank, model, words, circuit.needed_accumulator_bits),
     )
 }
 
@@ -287,12 +297,19 @@ fn listed(noun: &str, letter: &str, numbers: std::ops::Range<usize>) -> String {
 }
 
 /// What becomes of the samples, and where bits are lost.
-fn arithmetic(model: &BitTrue, words: WordSizes, needed: u32) -> String {
-    let offsets = if model.filters.has_offsets() {
+fn arithmetic(bank: &Bank, model: &BitTrue, words: WordSizes, needed: u32) -> String {
+    let offsets = if bank.offsets.iter().any(|offset| *offset != 0.0) {
         " The offsets of the channels are subtracted as constants."
     } else {
         ""
     };
+    let (straight, guard_bits) = match &model.straightening {
+        Some(_) => {
+            (format!("Nonlinearities are taken out by tables, to 2^-{GUARD_BITS} of a step. "), GUARD_BITS)
+        }
+        None => (String::new(), 0),
+    };
+    let guard_bits = guard_bits as i32;
     let sums = match needed <= words.accumulator {
         true => format!(
             "No sum overflows: a width of {needed} holds all, and each word is as wide as its values need"
@@ -304,8 +321,8 @@ fn arithmetic(model: &BitTrue, words: WordSizes, needed: u32) -> String {
     };
     format!(
         "A tap is its integer times 2^{}, and a step of an output is one of a sample.{offsets}\n   \
-         {sums}.\n   Each sum is rounded to the nearest step, halves upwards, and saturates",
-        -model.fraction_bits,
+         {straight}{sums}.\n   Each sum is rounded to the nearest step, halves upwards, and saturates",
+        guard_bits - model.fraction_bits,
     )
 }
 

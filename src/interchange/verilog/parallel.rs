@@ -4,6 +4,7 @@
 
 use super::netlist::{Netlist, ShiftedWord, Word, wrapped};
 use super::output::{OutputRounding, held_sum};
+use super::tables::Samples;
 use crate::interchange::bit_true::{IntegerFilters, Range};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -12,12 +13,11 @@ use std::fmt::Write;
 pub(super) fn parallel(
     netlist: &mut Netlist,
     filters: &IntegerFilters,
-    input_bits: u32,
+    samples: &Samples,
     output: OutputRounding,
 ) -> usize {
     let taps = &filters.taps;
-    let inputs: Vec<Word> =
-        (1..=taps.channels).map(|i| Word::at(0, format!("x{i}"), Range::of_bits(input_bits))).collect();
+    let inputs = samples.words(netlist);
     let products: Vec<_> = inputs.iter().enumerate().map(|(i, x)| products(netlist, filters, i, x)).collect();
     let trees: Vec<Vec<Option<ShiftedWord>>> = (0..taps.ratio)
         .map(|p| (0..taps.lags).map(|j| tree(netlist, filters, &products, p, j)).collect())

@@ -5,6 +5,7 @@ use crate::bank::{Bank, FixedPoint};
 use crate::interchange::ExportError;
 use crate::interchange::bit_true::BitTrue;
 use crate::interchange::layout::PolyphaseTaps;
+use crate::interchange::straightening::codes;
 use std::fmt::Write;
 
 /// Random frames of a testbench, at most: simulators take minutes for as many.
@@ -19,7 +20,10 @@ pub(super) fn files(verilog: &Verilog, random: u32) -> Result<Vec<(String, Strin
     let taps = model.filters.taps.clone();
     let (mut input, mut expected, mut files) = (String::new(), String::new(), Vec::new());
     let mut add = |model: &mut BitTrue| {
-        let frames = frames(&model.filters.taps, model.words.input, &model.resting(), random);
+        let mut frames = frames(&model.filters.taps, model.words.input, &model.resting(), random);
+        if model.straightening.is_some() {
+            frames.extend(codes(model.words.input).flat_map(|code| vec![code as i32; taps.channels]));
+        }
         // A line has the frames of a clock.
         let length = taps.channels * verilog.circuit.frames_per_clock;
         for line in frames.chunks(length) {

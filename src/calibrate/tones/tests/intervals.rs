@@ -6,6 +6,7 @@ use crate::calibrate::testbench::{
     assert_holds, errors, gaussian, interleaved, random_errors, tones, with_errors,
 };
 use crate::calibrate::{Calibration, CalibrationSettings, CalibrationSignal, Record, calibrate};
+use crate::linalg::Complex;
 use crate::random::Random;
 use crate::spec::{OneOrEach, Spec, UncertaintySpec};
 use crate::units::RadiansPerFastPeriod;
@@ -15,11 +16,12 @@ fn draws(what: &str) -> usize {
     if trials::is_slow(what) { 100 } else { 12 }
 }
 
-/// Tones of amplitude 1 sampled at instants that err by Gaussian numbers of `jitter` fast periods.
+/// Tones of amplitude 1 sampled at instants that err by Gaussian numbers of `jitter` fast periods: their real
+/// parts, or the exponentials themselves.
 fn jittered(
     truth: &Spec,
     list: &[f64],
-    frames: usize,
+    is_complex: bool,
     [noise, jitter]: [f64; 2],
     dice: &mut Random,
 ) -> Vec<Record> {
@@ -33,11 +35,16 @@ fn jittered(
             let tone = |(frequency, phase): (&f64, &f64)| {
                 let w = TAU * frequency * h;
                 let response = filter.response(RadiansPerFastPeriod(w)) * channel.gain;
-                response.norm() * (w * instant + response.arg() + phase).cos()
+                Complex::from_polar(response.norm(), w * instant + response.arg() + phase)
             };
-            list.iter().zip(&phases).map(tone).sum::<f64>() + channel.offset + noise * gaussian(dice)
+            let exact: Complex<f64> = list.iter().zip(&phases).map(tone).sum();
+            exact + Complex::new(channel.offset + noise * gaussian(dice), noise * gaussian(dice))
         };
-        Record::new((0..frames).map(sample).collect())
+        let (real, imaginary): (Vec<f64>, Vec<f64>) = (0..2048).map(sample).map(|x| (x.re, x.im)).unzip();
+        match is_complex {
+            true => Record::complex(Record::new(real), Record::new(imaginary)),
+            false => Record::new(real),
+        }
     };
     truth.channels.iter().map(channel).collect()
 }
@@ -46,18 +53,29 @@ fn jittered(
 #[test]
 fn intervals_of_delays_cover_with_jitter() {
     let (spec, draws) = (interleaved(), draws("jitter of 100 draws"));
-    for list in [&[417e3][..], &[61e3, 203e3, 467e3], &[31e3, 91e3, 163e3, 211e3, 287e3, 333e3, 402e3, 467e3]]
-    {
+    let eight = [31e3, 91e3, 163e3, 211e3, 287e3, 333e3, 402e3, 467e3];
+    for (list, is_complex) in [
+        (&[417e3][..], false),
+        (&[61e3, 203e3, 467e3], false),
+        (&eight, false),
+        (&[417e3], true),
+        (&[61e3, -203e3, 467e3], true),
+        (&eight, true),
+    ] {
         let (mut dice, mut scaled) = (Random(19), Vec::new());
         for _ in 0..draws {
             let truth = with_errors(&spec, &random_errors(&mut dice, 4, [0.01, 0.01, 0.002, 0.0]));
-            let records = jittered(&truth, list, 2048, [1e-4, 2e-3], &mut dice);
+            let records = jittered(&truth, list, is_complex, [1e-4, 2e-3], &mut dice);
             let signal = CalibrationSignal::Tones(hertz(list));
             let found = calibrate(&spec, &records, &signal, CalibrationSettings::default()).unwrap();
             let delays = errors(&truth, &found).delays.into_iter().zip(&found.channels[1..]);
             scaled.extend(delays.map(|(error, channel)| error / channel.delay.unwrap().sigma.0));
         }
-        assert_holds(&scaled, draws, &format!("delays of {} tones with jitter", list.len()));
+        assert_holds(
+            &scaled,
+            draws,
+            &format!("delays of {} tones with jitter, complex {is_complex}", list.len()),
+        );
     }
 }
 

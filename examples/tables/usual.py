@@ -1,4 +1,4 @@
-"""The simple ways to use several converters as one, in numpy, as one would write them by hand.
+"""The usual ways to use several converters as one, in numpy, as one would write them by hand.
 
 What they know of the converters comes from the same captures: sines fitted to each converter.
 """

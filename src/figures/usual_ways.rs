@@ -26,7 +26,7 @@ const MOST_ALONE: usize = 8;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
-pub enum SimpleWay {
+pub enum UsualWay {
     /// One channel through its best filter: least mean-square error, with samples of all time.
     OneChannel,
     /// Each output sample is the slow sample nearest to its instant; with as many channels as the ratio
@@ -41,19 +41,22 @@ pub enum SimpleWay {
     LeastSquares,
 }
 
-/// What a simple way gives.
+/// What a usual way gives.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct SimpleFigure {
+pub struct UsualFigure {
     /// The way.
-    pub way: SimpleWay,
+    pub way: UsualWay,
     /// The channel that is used alone, from 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub channel: Option<usize>,
     /// Its signal-to-noise ratio, with all parts; with converters of 16 bits where the spec states no noise.
     pub snr_db: Decibels,
+    /// The distance of its largest image from the tone, with uncertain delays and gains as for the bank;
+    /// `None` of one channel, which leaves its images, and where a tone of the band is lost altogether.
+    pub sfdr_db: Option<Decibels>,
 }
 
-/// All simple ways for a problem.
+/// The ways for a problem that need no design.
 pub(super) fn ways(problem: &Problem) -> Vec<Reconstruction> {
     let spline = Reconstruction::Spline(Spline::new(problem));
     let alone = kinds(problem)
@@ -62,8 +65,8 @@ pub(super) fn ways(problem: &Problem) -> Vec<Reconstruction> {
     Reconstruction::interleaving(problem).into_iter().chain([spline]).chain(alone).collect()
 }
 
-/// The usual ways beside `bank`: all simple ways, each channel's own correction for signals in a band, and
-/// least-squares taps.
+/// The usual ways beside `bank`: those that need no design, each channel's own correction for signals in a
+/// band, and least-squares taps.
 ///
 /// # Errors
 /// As [`crate::design::Problem::new`].
@@ -113,27 +116,31 @@ pub(super) fn kinds(problem: &Problem) -> Vec<(usize, Range<usize>)> {
     kinds
 }
 
-/// The figures of the usual ways among `ways`, the best simple one first, and of single channels only the
-/// best; least-squares taps, which are a bank too, come last.
-pub(super) fn figures(ways: &[Reconstruction], ratios: &[Ratios]) -> Vec<SimpleFigure> {
-    let named = |(way, ratios): (&Reconstruction, &Ratios)| {
-        let (way, channel) = match way {
+/// The figures of the usual ways, the best one first, and of single channels only the best; least-squares
+/// taps, which are a bank too, come last. `sfdr` gives that of a way.
+pub(super) fn figures(
+    ways: &[Reconstruction],
+    ratios: &[Ratios],
+    sfdr: impl Fn(&Reconstruction) -> Option<Decibels>,
+) -> Vec<UsualFigure> {
+    let named = |(of, ratios): (&Reconstruction, &Ratios)| {
+        let (way, channel) = match of {
             Reconstruction::Bank(_) => return None,
-            Reconstruction::Interleaving(_) => (SimpleWay::Interleaving, None),
-            Reconstruction::Spline(_) => (SimpleWay::CubicSpline, None),
-            Reconstruction::Corrected(_) => (SimpleWay::OwnCorrection, None),
-            Reconstruction::LeastSquares(_) => (SimpleWay::LeastSquares, None),
-            Reconstruction::OneChannel { converter, .. } => (SimpleWay::OneChannel, Some(converter + 1)),
+            Reconstruction::Interleaving(_) => (UsualWay::Interleaving, None),
+            Reconstruction::Spline(_) => (UsualWay::CubicSpline, None),
+            Reconstruction::Corrected(_) => (UsualWay::OwnCorrection, None),
+            Reconstruction::LeastSquares(_) => (UsualWay::LeastSquares, None),
+            Reconstruction::OneChannel { converter, .. } => (UsualWay::OneChannel, Some(converter + 1)),
         };
-        Some(SimpleFigure { way, channel, snr_db: ratios.with_noise() })
+        Some(UsualFigure { way, channel, snr_db: ratios.with_noise(), sfdr_db: sfdr(of) })
     };
-    let mut found: Vec<SimpleFigure> = ways.iter().zip(ratios).filter_map(named).collect();
-    let is_bank = |figure: &SimpleFigure| figure.way == SimpleWay::LeastSquares;
+    let mut found: Vec<UsualFigure> = ways.iter().zip(ratios).filter_map(named).collect();
+    let is_bank = |figure: &UsualFigure| figure.way == UsualWay::LeastSquares;
     found.sort_by(|a, b| is_bank(a).cmp(&is_bank(b)).then(b.snr_db.0.total_cmp(&a.snr_db.0)));
     let mut alone = 0;
     found.retain(|figure| {
-        alone += usize::from(figure.way == SimpleWay::OneChannel);
-        figure.way != SimpleWay::OneChannel || alone == 1
+        alone += usize::from(figure.way == UsualWay::OneChannel);
+        figure.way != UsualWay::OneChannel || alone == 1
     });
     found
 }
