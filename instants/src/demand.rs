@@ -6,7 +6,7 @@ use super::recording::Recording;
 use hybank_core::units::FastPeriods;
 use hybank_linalg::{LinalgError, Mat};
 
-/// Outputs of a block of which the error is computed, at least: it takes longer than the output itself.
+/// Outputs of a block of which the error is computed, at most: it takes longer than the output itself.
 const ERRORS: usize = 5;
 
 /// The longest time between two outputs of a block.
@@ -50,10 +50,50 @@ pub(super) fn outputs(
     let factor = set.factor()?;
     let solved = factor.solve(&Mat::from_column_slice(values.len(), 1, &values));
     let outputs = set.with_target(&instants).tr_mul(&solved).as_slice().to_vec();
-    // An odd number: even ones would meet the same phase of a frame again and again.
-    let every = (instants.len() / ERRORS).max(1) | 1;
-    let looked_at: Vec<FastPeriods> = instants.iter().step_by(every).copied().collect();
+    let looked_at: Vec<FastPeriods> =
+        looked_at(origin, instants.len()).into_iter().map(|k| instants[k]).collect();
     let with_target = set.with_target(&looked_at);
     let errors = set.best_errors(&factor.solve(&with_target), &with_target);
     Ok(Outputs { outputs, error: MeanSquare::mean(&errors) })
+}
+
+/// The outputs of a block of `count` whose error is computed: one somewhere in each of equal parts. Multiples
+/// of the golden ratio say where, so that over many blocks every phase of any pattern is met equally often.
+fn looked_at(origin: FastPeriods, count: usize) -> Vec<usize> {
+    let parts = ERRORS.min(count);
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let number = (origin.0 / count as f64).round() * parts as f64;
+    let place = |part: usize| {
+        let within = ((number + part as f64) * golden).rem_euclid(1.0);
+        ((part as f64 + within) * count as f64 / parts as f64) as usize
+    };
+    (0..parts).map(place).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Patterns of 2 to 16 outputs, in blocks of 64.
+    #[test]
+    fn errors_are_looked_at_in_all_phases() {
+        for pattern in 2..=16 {
+            let mut met = vec![0.0; pattern];
+            for block in 0..2000 {
+                let chosen = looked_at(FastPeriods(64.0 * f64::from(block)), 64);
+                chosen.iter().for_each(|k| met[(64 * block as usize + k) % pattern] += 1.0);
+            }
+            let mean = 2000.0 * ERRORS as f64 / pattern as f64;
+            assert!(met.iter().all(|count| (count / mean - 1.0_f64).abs() < 0.05), "{pattern}: {met:?}");
+        }
+    }
+
+    #[test]
+    fn errors_are_looked_at_within_the_block() {
+        for count in 1..=64 {
+            let chosen = looked_at(FastPeriods(-1e6 / 3.0), count);
+            assert_eq!(chosen.len(), count.min(ERRORS));
+            assert!(chosen.is_sorted() && chosen.iter().all(|k| *k < count), "{chosen:?}");
+        }
+    }
 }

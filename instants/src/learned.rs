@@ -15,12 +15,16 @@ const FLOOR: f64 = 1e-10;
 
 /// Welch's estimate of the spectrum of `signal` over some of its `parts`, and the power there; `None` if
 /// none of these holds a segment. It is smoothed, because each segment has few degrees of freedom, and has a
-/// floor 100 dB below its largest density. `noise` is the density of noise in the signal, as power per cycle
-/// per fast period over both signs of frequency; it is subtracted.
+/// floor 100 dB below its largest density.
+///
+/// The signal is an estimate: what passed `gain`, by bands, was the signal with noise of the density `noise`,
+/// as power per cycle per fast period over both signs of frequency. So its spectrum is divided by the square
+/// of the gain, and the noise is subtracted.
 pub fn learned(
     signal: &[f64],
     parts: &[Range<usize>],
     noise: f64,
+    gain: &dyn Fn(Range<CyclesPerFastPeriod>) -> f64,
     longest: FastPeriods,
 ) -> Option<(Spectrum, f64)> {
     let mut density = [0.0; SEGMENT / 2 + 1];
@@ -43,13 +47,14 @@ pub fn learned(
     let logarithms: Vec<f64> = density.iter().map(|density| density.max(FLOOR * most).ln()).collect();
     // The sums over all segments that white noise of this density has in each bin.
     let of_noise = noise * count as f64 * SEGMENT as f64 * 0.375;
+    let edge = |k: f64| CyclesPerFastPeriod((k / SEGMENT as f64).clamp(0.0, 0.5));
+    let band = |k: usize| edge(k as f64 - 0.5)..edge(k as f64 + 0.5);
     let smooth = |k: usize| {
         let beside = &logarithms[k.saturating_sub(BESIDE)..(k + BESIDE + 1).min(logarithms.len())];
         let density = (beside.iter().sum::<f64>() / beside.len() as f64).exp();
-        (density - of_noise).max(FLOOR * most)
+        (density / gain(band(k)).powi(2) - of_noise).max(FLOOR * most)
     };
-    let edge = |k: f64| CyclesPerFastPeriod((k / SEGMENT as f64).clamp(0.0, 0.5));
-    let bins = (0..logarithms.len()).map(|k| (edge(k as f64 - 0.5)..edge(k as f64 + 0.5), smooth(k)));
+    let bins = (0..logarithms.len()).map(|k| (band(k), smooth(k)));
     Some((Spectrum::of_pieces(bins, longest), power))
 }
 

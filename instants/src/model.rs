@@ -10,12 +10,16 @@ use super::signals::{Converter, Signals};
 use super::spectrum::Spectrum;
 use hybank_core::units::{CyclesPerFastPeriod, FastPeriods};
 use hybank_linalg::{Complex, LinalgError};
+use std::ops::Range;
 
 /// Parts of the run from which the spectrum is learned, and outputs of each.
 const PARTS: usize = 64;
 const OUTPUTS_OF_PART: usize = 2048;
-/// Instants at which samples are left out, to measure the noise.
+/// Instants at which samples are left out, to judge a model.
 pub(super) const TRIALS: usize = 64;
+/// The same for the last measurement of the noise: with fewer, a difference of 6 dB between the noises of
+/// recordings may not be significant.
+const NOISE_TRIALS: usize = 256;
 /// Noises that are tried with each band, over the power of the signal: as of recorders with 30, 50 and 70
 /// dB.
 const FIRST_NOISES: [f64; 3] = [1e-3, 1e-5, 1e-7];
@@ -24,6 +28,8 @@ const BANDS: std::ops::RangeInclusive<u32> = 3..=16;
 /// The density beyond the band over that within, before the spectrum is learned: so little that noise is not
 /// taken for signal.
 const BEYOND: f64 = 1e-10;
+/// The gain of an estimate below which too little of the signal is in it to be restored.
+const LEAST_GAIN: f64 = 0.3;
 /// Twice the gain of log-likelihood that says that a recording has a noise of its own: once in a hundred by
 /// chance.
 const SIGNIFICANT: f64 = 6.6;
@@ -64,8 +70,8 @@ impl Model {
     /// Samples that are left out and predicted from those around them judge a model, by their likelihood. So
     /// the band is chosen, and the noise of each recording. The estimate with a spectrum that is flat over
     /// the band then shows the spectrum (Welch), over the half of the run where the predicted error is
-    /// least: elsewhere what is not resolved would be taken for signal. The noise of the estimate is
-    /// subtracted.
+    /// least: elsewhere what is not resolved would be taken for signal. What the estimate takes away is
+    /// restored, and the noise subtracted.
     ///
     /// # Errors
     /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
@@ -81,11 +87,12 @@ impl Model {
             all.map(|(gain, least)| least.max(share * power * gain * gain)).collect()
         };
         let mut model = Self::best(recordings, prior, settings, power, &noise)?;
-        model.measure_noise(recordings, prior, settings)?;
-        for _ in 0..prior.passes {
+        let trials = |pass: usize| if pass == prior.passes { NOISE_TRIALS } else { TRIALS };
+        model.measure_noise(recordings, prior, settings, trials(0))?;
+        for pass in 1..=prior.passes {
             let Some((spectrum, power)) = model.relearned(recordings, settings, longest)? else { break };
             model = Self::new(spectrum, power, model.noise, prior);
-            model.measure_noise(recordings, prior, settings)?;
+            model.measure_noise(recordings, prior, settings, trials(pass))?;
         }
         Ok(model)
     }
@@ -113,7 +120,7 @@ impl Model {
         let mut least = f64::INFINITY;
         for spectrum in spectra {
             let candidate = model(spectrum);
-            let trials = candidate.trials(recordings, settings);
+            let trials = candidate.trials(recordings, settings, TRIALS);
             for share in FIRST_NOISES {
                 let noise = noise(share);
                 let misfit = candidate.misfit(&trials, &noise)?;
@@ -125,8 +132,8 @@ impl Model {
         Ok(best)
     }
 
-    fn trials(&self, recordings: &[Recording], settings: FusionSettings) -> Trials {
-        let instants = instants(settings, TRIALS);
+    fn trials(&self, recordings: &[Recording], settings: FusionSettings, count: usize) -> Trials {
+        let instants = instants(settings, count);
         Trials::new(&self.estimator, recordings, settings.reach, self.power, &instants)
     }
 
@@ -180,7 +187,21 @@ impl Model {
             all.iter().zip(good).filter(|(_, error)| *error <= median).map(|(fused, _)| &fused.samples);
         let signal: Vec<f64> = chosen.flatten().copied().collect();
         let ranges: Vec<_> = (0..signal.len() / count).map(|k| k * count..(k + 1) * count).collect();
-        Ok(learned(&signal, &ranges, self.noise_density(recordings), longest))
+        let noise = self.noise_density(recordings);
+        Ok(learned(&signal, &ranges, noise, &|band| self.gain_of_estimate(band, noise), longest))
+    }
+
+    /// Wiener's gain `S / (S + N)` in a band, for noise of the density N; 1 where nothing can be restored.
+    fn gain_of_estimate(&self, band: Range<CyclesPerFastPeriod>, noise: f64) -> f64 {
+        let within = self
+            .spectrum
+            .nodes()
+            .iter()
+            .filter(|node| (band.start.0..band.end.0).contains(&node.frequency.0));
+        let share: f64 = within.map(|node| node.power).sum();
+        let signal = self.power * share / (2.0 * (band.end.0 - band.start.0));
+        let gain = signal / (signal + noise);
+        if gain < LEAST_GAIN { 1.0 } else { gain }
     }
 
     /// Density of the noise of an estimate, where the signal is far above it: samples carry as much as their
@@ -201,8 +222,9 @@ impl Model {
         recordings: &[Recording],
         prior: &Prior,
         settings: FusionSettings,
+        trials: usize,
     ) -> Result<(), LinalgError> {
-        let trials = self.trials(recordings, settings);
+        let trials = self.trials(recordings, settings, trials);
         let full: Vec<f64> = prior.gains.iter().map(|gain| self.power * gain * gain).collect();
         let bounded = |levels: &[f64]| -> Vec<f64> {
             let all = levels.iter().zip(&full).zip(&prior.least_noise);

@@ -329,7 +329,8 @@ fn the_spectrum_is_that_of_the_signal() {
             state
         })
         .collect();
-    let (spectrum, power) = learned(&signal, from_ref(&(0..60_000)), 0.0, FastPeriods(50.0)).unwrap();
+    let (spectrum, power) =
+        learned(&signal, from_ref(&(0..60_000)), 0.0, &|_| 1.0, FastPeriods(50.0)).unwrap();
     let variance = 1.0 / 3.0 / (1.0 - 0.81);
     assert!((power / variance - 1.0).abs() < 0.03, "{power} {variance}");
     let share = |f: f64| 1.0 / (Complex::from(1.0) - Complex::from_polar(0.9, -2.0 * PI * f)).norm_sqr();
@@ -342,8 +343,26 @@ fn the_spectrum_is_that_of_the_signal() {
         let exact: f64 = (0..count).map(|k| share((f64::from(k) + 0.5) / 10_000.0)).sum::<f64>() / total;
         assert!((below(f) - exact).abs() < 0.02, "{f}: {} {exact}", below(f));
     }
-    assert!(learned(&signal, from_ref(&(0..300)), 0.0, FastPeriods(50.0)).is_none());
-    assert!(learned(&[0.0; 2000], from_ref(&(0..2000)), 0.0, FastPeriods(50.0)).is_none());
+    assert!(learned(&signal, from_ref(&(0..300)), 0.0, &|_| 1.0, FastPeriods(50.0)).is_none());
+    assert!(learned(&[0.0; 2000], from_ref(&(0..2000)), 0.0, &|_| 1.0, FastPeriods(50.0)).is_none());
+}
+
+/// White noise that passed `1 + z^-1`, whose gain falls over the band, is white again.
+#[test]
+fn what_an_estimate_takes_away_is_restored() {
+    let mut random = Random(3);
+    let white: Vec<f64> = (0..120_000).map(|_| random.sample()).collect();
+    let estimate: Vec<f64> = white.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+    let gain =
+        |band: std::ops::Range<CyclesPerFastPeriod>| (0.5 * PI * (band.start.0 + band.end.0)).cos().max(0.1);
+    // A quarter of the variance 1/3 is noise.
+    let all = 0..estimate.len();
+    let (spectrum, _) = learned(&estimate, from_ref(&all), 1.0 / 12.0, &gain, FastPeriods(50.0)).unwrap();
+    let power = |low: f64| -> f64 {
+        let nodes = spectrum.nodes().iter().filter(|node| (low..low + 0.1).contains(&node.frequency.0));
+        nodes.map(|node| node.power).sum()
+    };
+    assert!((power(0.3) / power(0.05) - 1.0).abs() < 0.05, "{} {}", power(0.3), power(0.05));
 }
 
 /// Band, spectrum and noise of recordings that say nothing of them.

@@ -16,7 +16,7 @@ pub use tracked::{DelayTrack, Tracked, TrackedFusion, fuse_stamped};
 
 use crate::align::ClockStep;
 use crate::calibrate::Record;
-use crate::instants::{Fused, FusionSettings, Model, Prior, Recording, fuse};
+use crate::instants::{Fused, FusionSettings, MeanSquare, Model, Prior, Recording, fuse};
 use crate::sine_fit::Estimate;
 use crate::units::{CyclesPerFastPeriod, Decibels, FastPeriods, Hertz, Seconds};
 use clocks::Clocked;
@@ -192,7 +192,10 @@ fn check_memory(samples: usize) -> Result<(), MergeError> {
     room.try_reserve_exact(samples).map_err(|_| MergeError::Memory { samples })
 }
 
-/// Errors of the signal count by the power around, those of the noise as they are.
+/// Errors of the signal count by its power around, those of the noise as they are.
+///
+/// The best estimate of a signal of power P has the power P less that of its error: what the estimate lacks
+/// is expected to have the mean power of the signal.
 fn quality(
     model: &Model,
     fused: &Fused,
@@ -200,12 +203,15 @@ fn quality(
     grid: FusionSettings,
     rate: Hertz,
 ) -> Result<Quality, MergeError> {
-    let power = |block: &[f64]| block.iter().map(|x| x * x).sum::<f64>();
-    let blocks = fused.samples.chunks(fused.block).zip(&fused.errors);
-    let errors: Vec<f64> = blocks
-        .map(|(block, error)| error.signal * power(block) + error.noise * model.power * block.len() as f64)
+    let mean_power = |block: &[f64]| block.iter().map(|x| x * x).sum::<f64>() / block.len() as f64;
+    let blocks = || fused.samples.chunks(fused.block).zip(&fused.errors);
+    let signal = |block: &[f64], error: &MeanSquare| mean_power(block) + error.total() * model.power;
+    let errors: Vec<f64> = blocks()
+        .map(|(block, error)| {
+            (error.signal * signal(block, error) + error.noise * model.power) * block.len() as f64
+        })
         .collect();
-    let total = power(&fused.samples);
+    let total: f64 = blocks().map(|(block, error)| signal(block, error) * block.len() as f64).sum();
     let per_sample = total / fused.samples.len() as f64;
     let mut course = ErrorCourse::new(rate.0 / fused.block as f64);
     errors.iter().for_each(|error| course.add(*error));
