@@ -23,7 +23,7 @@ pub enum IoError {
     },
     /// The first bytes are not those of a WAV file.
     #[error(
-        "{}: not a WAV file (byte 0 holds {found}, where RIFF, RF64 or BW64 is expected); raw samples need a format name such as f32le, and a table through a pipe the format csv",
+        "{}: not a WAV file (byte 0 holds {found}, where RIFF, RF64 or BW64 is expected); raw samples need a format name such as f32le, a table through a pipe the format csv, and other recordings their usual ending",
         Quoted(.file)
     )]
     NotWav {
