@@ -141,7 +141,7 @@ impl MultiReader {
     /// Waits until every input has a frame, and tells `on_stall` of those that give none.
     ///
     /// # Errors
-    /// The system's refusal to read one of them, or [`IoError::ReaderDied`].
+    /// The system's refusal to read one of them.
     pub fn wait(&mut self, on_stall: OnStall<'_>) -> Result<Arrival, IoError> {
         for i in 0..self.inputs.len() {
             self.inputs[i].grouped.gather(false);
@@ -236,10 +236,10 @@ impl MultiReader {
         for input in &mut self.inputs {
             let per_frame = input.grouped.per_frame() as u64;
             let breaks = input.notes.timestamps.breaks(origin.saturating_mul(per_frame));
-            let breaks = breaks.map_err(|problem| input.timing_fault(problem))?;
+            let breaks = breaks.map_err(|problem| input.unfit(problem))?;
             let frames = breaks.iter().map(|next| next.lost).fold(0, u64::saturating_add) / per_frame;
             if frames > MOST_LOST {
-                return Err(input.timing_fault(format!(
+                return Err(input.unfit(format!(
                     "{frames} frames were lost in all, more than {MOST_LOST}; check the numbers, or fuse the parts one by one"
                 )));
             }
