@@ -1,13 +1,15 @@
 //! `fuse --bit-true`: integer taps on the integers of the captures, as hardware has them.
 
+use super::before_after;
 use super::observer::RunObserver;
 use super::output::begin_samples;
-use super::print::{Failure, check_strict, failed, name, print_report, stopped, warn};
+use super::print::{Failure, check_strict, failed, name, print, print_report, stopped, warn};
 use super::run::{BankRun, each_block};
 use hybank::files::commit_all;
 use hybank::interchange::{BitTrue, WordSizes};
 use hybank::io::{Container, MultiReader, OutputHeader, PcmFormat, RecordedFrames, SampleWriter};
 use hybank::messages::Quoted;
+use hybank::overview::BeforeAfter;
 use hybank::pipeline::DroppedLatency;
 use hybank::runtime::{FrameSource, Isa, SideBySide};
 
@@ -39,6 +41,9 @@ struct BitTrueReport {
     wrapped: u64,
     /// Output samples that saturated.
     saturated: u64,
+    /// The figures of plain interleaving and of the output, with --measure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    measure: Option<BeforeAfter>,
 }
 
 impl BitTrueArgs {
@@ -52,6 +57,7 @@ impl BitTrueArgs {
         job: &BankRun<'_>,
         reader: &mut MultiReader,
         observer: &mut RunObserver,
+        measured: impl FnOnce() -> Result<Option<BeforeAfter>, Failure>,
     ) -> Result<(), Failure> {
         let rate = job.output_rate(reader)?;
         let format = integer_format(reader)?;
@@ -67,7 +73,7 @@ impl BitTrueArgs {
         each_block(reader, observer, |_, recordings| run.process(recordings))?;
         let frames = reader.consumed();
         run.flush()?;
-        let report = BitTrueReport {
+        let mut report = BitTrueReport {
             samples: run.samples,
             rate: rate.round() as u64,
             frames,
@@ -77,13 +83,19 @@ impl BitTrueArgs {
             needed_accumulator_bits: run.model.needed_bits(),
             wrapped: run.model.wraps(),
             saturated: run.model.saturations(),
+            measure: None,
         };
         let warnings: Vec<String> =
             reader.warnings().iter().map(ToString::to_string).chain(run.model.warnings()).collect();
         check_strict(&warnings, job.args.strict)?;
         commit_all(run.output.finish().map_err(stopped)?).map_err(failed)?;
         warnings.iter().for_each(|warning| warn(warning));
-        if job.args.json { print_report(&report, job.output) } else { Ok(()) }
+        report.measure = measured()?;
+        match &report.measure {
+            _ if job.args.json => print_report(&report, job.output),
+            Some(figures) => print(&before_after::text(figures)),
+            None => Ok(()),
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Recordings in memory, with what must be known about their format.
 
 use super::file_kind::unreadable;
-use super::print::{Failure, failed, failed_at, name, warn};
+use super::print::{Failure, failed, failed_at, is_dash, name, warn};
 use hybank::captures::{CaptureError, Captures, ChannelSamples};
 use hybank::io::{MultiReader, ReadOptions, check_real};
 use hybank::messages::Quoted;
@@ -93,5 +93,16 @@ pub(super) fn unread(error: CaptureError) -> Failure {
             Failure::Input(format!("{error}: --channel 1 to {channels}"))
         }
         error => failed(error),
+    }
+}
+
+/// Refuses what cannot be read twice.
+pub(super) fn check_files_on_disk(paths: &[PathBuf], option: &str) -> Result<(), Failure> {
+    match paths.iter().find(|path| is_dash(path) || path.metadata().is_ok_and(|found| !found.is_file())) {
+        None => Ok(()),
+        Some(path) => Err(Failure::Usage(format!(
+            "{option} reads inputs and output once more, which {} cannot give; use files",
+            Quoted(name(path))
+        ))),
     }
 }

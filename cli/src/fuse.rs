@@ -1,6 +1,7 @@
 //! `hybank fuse`: fuses slow recordings into one fast recording.
 
 use super::bank_file;
+use super::before_after::{self, BeforeAfterArgs};
 use super::bit_true::BitTrueArgs;
 use super::capture_args::CaptureArgs;
 use super::choice::one_of;
@@ -10,8 +11,9 @@ use super::print::{Failure, is_dash, print, print_report, say_understood};
 use super::run::{BankRun, Finished, RunArgs, RunReport};
 use super::tracked::{self, InstantArgs};
 use hybank::bank::Bank;
-use hybank::io::PcmFormat;
+use hybank::io::{MultiReader, OnStall, PcmFormat};
 use hybank::messages::{Quoted, counted};
+use hybank::overview::BeforeAfter;
 use hybank::pipeline::DroppedLatency;
 use hybank::quantity::readable;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -30,6 +32,7 @@ Examples:
   hybank fuse bank.json left.wav right.wav -o fused.wav
   hybank fuse bank.json both.wav -o fused.wav --bits 24 --force
   hybank fuse bank.json capture.wav -o fused.wav --interleaved 4
+  hybank fuse bank.json tone1.wav tone2.wav -o fused.wav --measure --plot spectra.svg
   hybank fuse fixed.json ch1.wav ch2.wav -o fused.wav --bit-true --accumulator 40
   sox capture.flac -t wav - | hybank fuse bank.json - -o - | play -t wav -")]
 pub(super) struct Args {
@@ -55,6 +58,8 @@ pub(super) struct Args {
     #[command(flatten)]
     instants: InstantArgs,
     #[command(flatten)]
+    before_after: BeforeAfterArgs,
+    #[command(flatten)]
     run: RunArgs,
 }
 
@@ -75,6 +80,9 @@ struct FusionReport<'a> {
     /// Whether the captures agree with the spec of the bank.
     captures: &'a str,
     seconds: f64,
+    /// The figures of plain interleaving and of the output, with --measure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    measure: Option<BeforeAfter>,
 }
 
 /// Runs the command.
@@ -91,8 +99,9 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
 }
 
 impl FusionReport<'_> {
-    /// What was written, and whether the captures agree with the bank.
+    /// The figures of --measure; what was written, and whether the captures agree with the bank.
     fn text(&self, output: &Path) -> String {
+        let figures = self.measure.as_ref().map_or_else(String::new, before_after::text);
         let (samples, clipped) = (counted(self.run.outcome.samples, "sample"), self.run.outcome.clipped);
         let rate = self.rate as f64;
         let length = readable(self.run.outcome.samples as f64 / rate, "s");
@@ -100,7 +109,7 @@ impl FusionReport<'_> {
             if self.peak > 0.0 { format!(" ({:.1} dBFS)", 20.0 * self.peak.log10()) } else { String::new() };
         let clipped = if clipped == 0 { "none".to_owned() } else { clipped.to_string() };
         format!(
-            "{}: {samples} at {} = {length}, peak {:.4}{level}, {clipped} clipped\n{}\n",
+            "{figures}{}: {samples} at {} = {length}, peak {:.4}{level}, {clipped} clipped\n{}\n",
             Quoted(output),
             readable(rate, "S/s"),
             self.peak,
@@ -113,8 +122,10 @@ impl Args {
     /// Refuses impossible combinations of options, before any file is read.
     fn check(&self) -> Result<(), Failure> {
         self.reading.check(self.run.interleaved.is_given())?;
+        self.before_after.check(&self.inputs, &self.output, self.run.force)?;
         self.instants.track.check(&self.output)?;
-        self.run.check(&self.bank, &self.inputs, &self.output, container_of(&self.output))
+        let prints = self.before_after.is_wanted();
+        self.run.check(&self.bank, &self.inputs, &self.output, container_of(&self.output), prints)
     }
 
     fn job<'a>(&'a self, bank: &'a Bank) -> BankRun<'a> {
@@ -139,10 +150,9 @@ impl Args {
         }
         let track = self.instants.track.file();
         let tracked = track.map(|table| tracked::fusion(job, table)).transpose()?;
-        let mut reader =
-            job.start_reader(&self.inputs, self.reading.format(), &mut |stall| observer.stalled(stall))?;
+        let mut reader = self.start_reader(job, &mut |stall| observer.stalled(stall))?;
         if self.bit_true.is_wanted() {
-            return self.bit_true.fuse(job, &mut reader, observer);
+            return self.bit_true.fuse(job, &mut reader, observer, || self.measured(job));
         }
         if let Some(fusion) = tracked {
             return tracked::run(job, fusion, reader, observer);
@@ -153,9 +163,10 @@ impl Args {
         let finished = job.run(&plan, &mut reader, observer, &|frames| progress.inc(frames))?;
         progress.finish_and_clear();
         let seconds = begin.elapsed().as_secs_f64();
+        let measure = self.measured(job)?;
         let Finished { report: run, frames, dropped: latency_dropped, peak, captures, .. } = &finished;
         let (rate, frames, latency_dropped, peak) = (rate.round() as u64, *frames, *latency_dropped, *peak);
-        let report = FusionReport { run, rate, frames, latency_dropped, peak, captures, seconds };
+        let report = FusionReport { run, rate, frames, latency_dropped, peak, captures, seconds, measure };
         observer.end(&report)?;
         if self.run.json {
             return print_report(&report, &self.output);
@@ -166,6 +177,19 @@ impl Args {
             return Ok(());
         }
         print(&report.text(&self.output))
+    }
+
+    fn start_reader(&self, job: &BankRun<'_>, on_stall: OnStall<'_>) -> Result<MultiReader, Failure> {
+        job.start_reader(&self.inputs, self.reading.format(), on_stall)
+    }
+
+    /// Reads the inputs once more, and the output.
+    fn measured(&self, job: &BankRun<'_>) -> Result<Option<BeforeAfter>, Failure> {
+        if !self.before_after.is_wanted() {
+            return Ok(None);
+        }
+        let reader = self.start_reader(job, &mut |_| {})?;
+        self.before_after.measured(job.bank, reader, &self.output, self.run.force).map(Some)
     }
 }
 

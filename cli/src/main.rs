@@ -5,6 +5,7 @@
 mod align;
 mod analyze;
 mod bank_file;
+mod before_after;
 mod bit_true;
 mod calibrate;
 mod calibrate_report;

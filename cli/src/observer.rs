@@ -37,14 +37,14 @@ impl ObserverArgs {
         self.report.as_deref()
     }
 
-    /// Refuses two uses of standard output: `samples`, the report, and the result in `json`.
-    pub(super) fn check(&self, samples: &Path, json: bool) -> Result<(), Failure> {
+    /// Refuses two uses of standard output: `samples`, the report, and, if it `prints`, the result.
+    pub(super) fn check(&self, samples: &Path, prints: bool) -> Result<(), Failure> {
         let message = match self.report() {
             Some(report) if is_dash(report) && is_dash(samples) => {
                 "--report - needs --output: standard output carries the samples"
             }
-            Some(report) if is_dash(report) && json => {
-                "--report - and --json both want standard output; give the report a file"
+            Some(report) if is_dash(report) && prints => {
+                "--report - and --json or --measure both want standard output; give the report a file"
             }
             _ => return Ok(()),
         };

@@ -71,18 +71,20 @@ impl RunArgs {
         ThreadPool::new(threads).map(Some).map_err(refused)
     }
 
-    /// Refuses impossible combinations of options, before any file is read.
+    /// Refuses impossible combinations of options, before any file is read. The command `prints` on standard
+    /// output besides.
     pub(super) fn check(
         &self,
         bank: &Path,
         inputs: &[PathBuf],
         output: &Path,
         container: Container,
+        prints: bool,
     ) -> Result<(), Failure> {
         check_stdin(inputs.iter().map(PathBuf::as_path).chain([bank]))?;
         self.gaps.check()?;
         self.interleaved.check(inputs.len())?;
-        self.observer.check(output, self.json)?;
+        self.observer.check(output, self.json || prints)?;
         let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).chain([bank]).collect();
         let others = self.gaps.mask().into_iter().chain(self.observer.report());
         check_files(output, container, &others.collect::<Vec<&Path>>(), &inputs)

@@ -103,7 +103,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     }
     let inputs = args.inputs();
     check_channels(args.channels, args.format)?;
-    args.run.check(&args.bank, &inputs, &args.output, args.container())?;
+    args.run.check(&args.bank, &inputs, &args.output, args.container(), false)?;
     args.track.check(&args.output)?;
     let bank = bank_file::load(&args.bank)?;
     say_understood(bank.spec.as_ref());

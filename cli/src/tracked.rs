@@ -36,7 +36,7 @@ pub(super) struct InstantArgs {
     pub(super) track: TrackArgs,
     /// Each capture is a table (.csv) whose first column says when its samples were taken: taps are made for
     /// these instants in place of the delays of the spec
-    #[arg(long, conflicts_with_all = ["track", "bit_true", "algorithm", "gaps", "keep_latency", "report",
+    #[arg(long, conflicts_with_all = ["track", "bit_true", "algorithm", "gaps", "keep_latency", "measure", "report",
           "interleaved", "threads"])]
     pub(super) stamps: bool,
 }

@@ -83,7 +83,7 @@ pub fn causes(spur: &Spur) -> String {
 /// let bank = Bank::bare(SynthesisFilters::Fir(vec![vec![1.0, 0.0], vec![0.0, 1.0 / 0.9]]), 2);
 /// let signal: Vec<f64> = (0..8192).map(|n| 0.5 * (0.7 * f64::from(n)).sin()).collect();
 /// let captures = [0, 1].map(|i| signal.iter().skip(i).step_by(2).map(|x| x * [1.0, 0.9][i]).collect());
-/// let both = BeforeAfter::of(&bank, Hertz(48e3), &captures, &signal)?;
+/// let both = BeforeAfter::of(&bank, Hertz(48e3), &captures, &signal, Vec::new())?;
 /// assert!(both.before.sinad.0 < 30.0 && both.after.sinad.0 > 200.0);
 /// assert_eq!(column(&both.after)[0].name, "SINAD");
 /// let drawn = DrawnRecording { label: "fused", measurement: Some(&both.after), comparison: None };
@@ -91,7 +91,7 @@ pub fn causes(spur: &Spur) -> String {
 /// assert_eq!(chart.series[0].label, "fused");
 /// # Ok::<(), hybank::overview::Unmeasured>(())
 /// ```
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize)]
 pub struct BeforeAfter {
     /// Of plain interleaving: each output sample is the input sample that was taken nearest to it.
     pub before: Measurement,
@@ -110,13 +110,20 @@ pub struct Unmeasured {
 }
 
 impl BeforeAfter {
-    /// Of captures, and of what `bank` made of them at the fast `rate`.
+    /// Of captures, and of what `bank` made of them at the fast `rate`, with these tones, or the largest
+    /// one.
     ///
     /// # Errors
     /// [`Unmeasured`].
-    pub fn of(bank: &Bank, rate: Hertz, captures: &[Vec<f64>], fused: &[f64]) -> Result<Self, Unmeasured> {
+    pub fn of(
+        bank: &Bank,
+        rate: Hertz,
+        captures: &[Vec<f64>],
+        fused: &[f64],
+        tones: Vec<Hertz>,
+    ) -> Result<Self, Unmeasured> {
         let rails = (f64::NEG_INFINITY, f64::INFINITY);
-        let settings = Settings { converters: bank.ratio, rails, ..Settings::default() };
+        let settings = Settings { tones, converters: bank.ratio, rails, ..Settings::default() };
         let of = |which, samples: &[f64]| {
             measure(inner(bank, samples), rate, &settings).map_err(|error| Unmeasured { which, error })
         };

@@ -74,7 +74,7 @@ impl CapturesOnPage {
         // What was lost is a zero, as `fuse` has it without --gaps.
         channels.iter_mut().flatten().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
         let fused = fused(bank, &channels, Settings::default())?;
-        let measured = BeforeAfter::of(bank, rate, &channels, &fused);
+        let measured = BeforeAfter::of(bank, rate, &channels, &fused, Vec::new());
         let measured = measured.map_err(|reason| reason.to_string()).and_then(|measured| {
             let is_tone = measured.after.sinad > LEAST_TONE;
             if is_tone { Ok(measured) } else { Err("they hold more than a tone".to_owned()) }

@@ -113,6 +113,7 @@ fn an_output_may_be_a_fifo() {
     assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap()["samples"], 600);
     assert_eq!((&bytes[40..44], floats(&bytes[44..])), (&[0xFF; 4][..], fused(&frames(300))));
     assert!(desk.path("out.wav").metadata().unwrap().len() == 0, "the FIFO is still there");
+    desk.refused(2, &[&fuse[..], &["out.wav", "--measure"]].concat(), &["out.wav", "once more"]);
     // A reader that has seen enough ends the run quietly.
     let child = desk.spawn(&["stream", "bank.json", "--input", "/dev/zero", "-o", "out.wav"]);
     File::open(desk.path("out.wav")).unwrap().read_exact(&mut [0; 100]).unwrap();

@@ -181,3 +181,51 @@ fn a_reference_has_the_format_of_the_recording() {
         assert!((number(reference, "/gain/value") - 1.0).abs() < 1e-4, "{recording} {target}: {reference}");
     }
 }
+
+/// Two channels 0.4 fast samples off their places: plain interleaving has the spurs of that skew, the bank
+/// not.
+#[test]
+fn fuse_measures_before_and_after() {
+    let desk = Desk::with_spec(THESIS);
+    desk.good(&["design", "spec.toml", "-o", "b.json", "--taps", "40", "--latency", "20"]);
+    let simulate = ["simulate", "b.json", "--source", "tones:0.35", "-o", "cap", "--samples", "8000"];
+    desk.good(&simulate);
+    let fuse = ["fuse", "b.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "y.wav", "--measure"];
+    let report = desk.good(&fuse);
+    assert!(
+        report.contains("interleaved") && report.contains("SINAD") && report.contains("fused"),
+        "{report}"
+    );
+    let found = desk.json(&[&fuse[..], &["--json", "--force"]].concat());
+    let (before, after) =
+        (number(&found, "/measure/before/sinad_db"), number(&found, "/measure/after/sinad_db"));
+    assert!(after > before + 20.0, "{before} {after}");
+    let tone = number(&found, "/measure/after/tones/0/frequency_hertz/value");
+    assert!((tone - 0.35 / TAU * RATE).abs() < 0.1, "{tone}");
+    desk.refused(
+        2,
+        &["fuse", "b.json", "cap/ch1.wav", "-", "-o", "z.wav", "--measure"],
+        &["--measure", "standard input"],
+    );
+    desk.refused(
+        2,
+        &["fuse", "b.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "-", "--measure"],
+        &["--measure"],
+    );
+    desk.refused(2, &[&fuse[..6], &["--tone", "9kHz"]].concat(), &["--measure"]);
+    // Both over one axis: rings before and discs after, and one line in the legend for each cause.
+    assert!(report.lines().any(|line| line.starts_with("worst of these")), "{report}");
+    desk.good(&[&fuse[..], &["--force", "--plot", "both.svg"]].concat());
+    let svg = String::from_utf8(desk.read("both.svg")).unwrap();
+    for label in ["interleaved (rings)", "fused (discs)", "gain or skew", "SFDR"] {
+        assert_eq!(svg.matches(label).count(), 1, "{label}");
+    }
+    let circles: Vec<&str> = svg.split("<circle").skip(1).filter_map(|rest| rest.split('>').next()).collect();
+    let rings = circles.iter().filter(|circle| circle.contains("fill=\"none\"")).count();
+    assert!(rings > 0 && circles.len() > rings, "{circles:?}");
+    desk.refused(1, &[&fuse[..], &["--plot", "both.svg"]].concat(), &["both.svg", "exists", "--force"]);
+    desk.refused(2, &[&fuse[..], &["--force", "--plot", "cap/ch1.wav"]].concat(), &["cap/ch1.wav"]);
+    desk.refused(2, &[&fuse[..6], &["--plot", "z.svg"]].concat(), &["--measure"]);
+    desk.refused(2, &[&fuse[..], &["--plot", "-"]].concat(), &["--plot -"]);
+    assert!(!desk.path("z.wav").exists());
+}

@@ -533,7 +533,7 @@ fn thousands_are_asked_about_and_columns_that_are_not_there_are_named() {
         );
     }
     let utf16: Vec<u8> = "1,2\n3,4\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
-    assert!(refusal(String::from_utf8(utf16).unwrap()).contains("save tables in UTF-8"));
+    assert!(refusal(&String::from_utf8(utf16).unwrap()).contains("save tables in UTF-8"));
 }
 
 #[test]
