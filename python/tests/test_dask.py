@@ -114,9 +114,11 @@ def test_sources_and_sinks(fir, tmp_path):
     np.save(tmp_path / "frames.npy", np.ascontiguousarray(x.T))
     for i in range(2):
         write_wav(tmp_path / f"{i}.wav", x[i], 24000)
-        meta = {"core:datatype": "ri16_le", "core:version": "1.0.0", "core:num_channels": 1}
+        # The samples of the second recording end before its file does.
+        more = {"core:trailing_bytes": 7 * i}
+        meta = {"core:datatype": "ri16_le", "core:version": "1.0.0", "core:num_channels": 1, **more}
         (tmp_path / f"{i}.sigmf-meta").write_text(json.dumps({"global": meta, "captures": [], "annotations": []}))
-        (tmp_path / f"{i}.sigmf-data").write_bytes(x[i].astype("<i2").tobytes())
+        (tmp_path / f"{i}.sigmf-data").write_bytes(x[i].astype("<i2").tobytes() + b"trailer"[: 7 * i])
     wav, sigmf = ([tmp_path / f"{i}.{kind}" for i in range(2)] for kind in ("wav", "sigmf-meta"))
     sources = [(tmp_path / "rows.npy", -1), (tmp_path / "frames.npy", 0), (wav, -1), (sigmf, -1)]
     sinks = [tmp_path / "out.npy"]

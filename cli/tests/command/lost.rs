@@ -63,18 +63,18 @@ fn meta(datatype: &str, channels: usize, captures: &str) -> String {
 /// What the metadata say of bytes that are no samples, of samples that are not there, and of what a reader
 /// must know.
 #[test]
-fn sigmf_that_is_not_all_samples_is_refused() {
+fn sigmf_that_is_not_all_samples_is_read_or_refused() {
     let desk = Desk::new();
     let input = frames(50);
     let meta = |more: &str| {
         format!(r#"{{"global": {{"core:datatype": "rf32_le", "core:num_channels": 2, {more}}}}}"#)
     };
-    desk.write("in.sigmf-data", bytes(&input));
-    desk.write("in.sigmf-meta", meta(r#""core:version": "1.0.0""#));
+    desk.write("in.sigmf-data", [bytes(&input), vec![7; 80]].concat());
+    desk.write("in.sigmf-meta", meta(r#""core:trailing_bytes": 80"#));
     let stream = ["stream", "bank.json", "--input", "in.sigmf-meta", "--output-format", "f32le"];
     assert_eq!(floats(&desk.run(&stream, &[]).stdout), fused(&input));
     for (more, parts) in [
-        (r#""core:trailing_bytes": 80"#, ["core:trailing_bytes", "the samples alone"]),
+        (r#""core:trailing_bytes": 481"#, ["core:trailing_bytes is 481", "480 bytes"]),
         (r#""core:metadata_only": true"#, ["core:metadata_only", "no samples"]),
         (
             r#""core:extensions": [{"name": "x", "optional": true}, {"name": "crypt", "optional": false}]"#,

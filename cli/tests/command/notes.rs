@@ -1,6 +1,6 @@
 //! What recordings say besides their samples, and what of it comes out. As a user runs it.
 
-use crate::support::{Desk, THESIS, bytes, channel, frames, wav};
+use crate::support::{Desk, THESIS, bytes, channel, frames, text, wav};
 use serde_json::{Value, json};
 
 /// A recording of one channel: three samples are lost before its sample 40.
@@ -139,4 +139,33 @@ fn what_a_wav_file_says_of_the_recording_survives() {
     let causal = desk.read("causal.wav");
     let at = causal.windows(4).position(|window| window == b"bext").unwrap() + 8 + 338;
     assert_eq!(causal[at..at + 8], 95_997_u64.to_le_bytes());
+}
+
+/// The samples and what their metadata state of them, SHA-512; trailing bytes are part of the file.
+#[test]
+fn a_digest_of_the_samples_is_checked() {
+    let desk = desk();
+    let zeros = "af3a1e15594a0bf08ae34a5948037ef492e71ee33d5d4ac9f24b18adf99a3456\
+                 3ab40ba8f47f2adff5d928f18d8a8cd60fc78e654e4d6cf962292d2f606def66";
+    let meta = |digest: &str, trailing: usize| {
+        json!({ "global": { "core:datatype": "rf32_le", "core:num_channels": 2, "core:version": "1.0.0",
+            "core:sample_rate": 24_000, "core:trailing_bytes": trailing, "core:sha512": digest } })
+    };
+    let fuse = ["fuse", "bank.json", "x.sigmf-meta", "-o", "x.wav", "--strict"];
+    let strict = [&fuse[..], &["--force"]].concat();
+    let altered = ["x.sigmf-meta", "core:sha512", "changed or damaged"];
+    let said = |args: &[&str]| text(&desk.run(args, &[]).stderr);
+    desk.write("x.sigmf-data", [0; 400]);
+    for (digest, trailing) in [(zeros.to_owned(), 0), (zeros.to_uppercase(), 80)] {
+        desk.write("x.sigmf-meta", meta(&digest, trailing).to_string());
+        desk.report(&fuse);
+    }
+    let mut changed = [0; 400];
+    changed[399] = 1;
+    for bytes in [&changed[..], &[0; 392]] {
+        desk.write("x.sigmf-data", bytes);
+        desk.refused(1, &strict, &altered);
+        let warned = said(&[&fuse[..5], &["--force"]].concat());
+        assert!(altered.iter().all(|word| warned.contains(word)), "{warned}");
+    }
 }

@@ -86,7 +86,8 @@ impl<R: ByteSource> Capture for ByteFrames<R> {
         let cut = (bytes > 0).then_some(InputFault::CutFrame { bytes });
         let bytes = self.frames.inner.further_bytes();
         let further = (bytes > 0).then_some(InputFault::FurtherSamples { bytes });
-        truncated.into_iter().chain(cut).chain(further).collect()
+        let altered = self.frames.inner.is_altered().then_some(InputFault::Altered);
+        truncated.into_iter().chain(cut).chain(further).chain(altered).collect()
     }
 
     fn chunks_after(&mut self) -> Vec<WavChunk> {

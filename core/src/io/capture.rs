@@ -55,6 +55,12 @@ pub(super) trait ByteSource: Read {
         0
     }
 
+    /// Whether the bytes are others than those that it was written with, as far as it says so; to be asked
+    /// once, when all samples have been read.
+    fn is_altered(&mut self) -> bool {
+        false
+    }
+
     /// Chunks after the samples, once these have all been read.
     fn chunks_after(&mut self) -> Vec<WavChunk> {
         Vec::new()

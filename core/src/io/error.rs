@@ -105,6 +105,9 @@ pub enum InputFault {
         /// Number of these bytes.
         bytes: u64,
     },
+    /// The file of samples of a SigMF recording has another digest than its metadata state.
+    #[error("its samples do not have the core:sha512 of its metadata: they were changed or damaged later")]
+    Altered,
     /// The first column of a table was left out.
     #[error(
         "its first column is a steady ramp and was taken for the times or an index of the lines, not for a channel; state it \

@@ -19,9 +19,9 @@ const FIRST_FRAMES: usize = 16_384;
 /// use hybank_core::io::FrameFile;
 /// # let folder = std::env::temp_dir().join(format!("hybank-frames-{}", std::process::id()));
 /// # std::fs::create_dir_all(&folder)?;
-/// let meta = r#"{"global": {"core:datatype": "ri16_le"}}"#;
+/// let meta = r#"{"global": {"core:datatype": "ri16_le", "core:trailing_bytes": 3}}"#;
 /// std::fs::write(folder.join("x.sigmf-meta"), meta)?;
-/// std::fs::write(folder.join("x.sigmf-data"), [1, 0, 2, 0])?;
+/// std::fs::write(folder.join("x.sigmf-data"), [1, 0, 2, 0, 7, 7, 7])?;
 /// let file = FrameFile::open(&folder.join("x.sigmf-meta"))?;
 /// assert_eq!((file.frames(), file.read::<f32>(1, 1)?), (2, vec![2.0 / 32768.0]));
 /// # std::fs::remove_dir_all(folder)?;
@@ -51,8 +51,12 @@ impl FrameFile {
                     "frames were lost (core:global_index jumps); fuse the whole recording, which fills them";
                 return Err(IoError::unfit(&name)(problem.into()));
             }
+            let Some(beginning) = reader.beginning() else {
+                let problem = "its captures have headers between their samples; fuse the whole recording";
+                return Err(IoError::unfit(&name)(problem.into()));
+            };
             let [_, data] = sigmf_files(path);
-            (data, reader.beginning(), reader.stream_header())
+            (data, beginning, reader.stream_header())
         } else {
             let reader = WavReader::new(open_file(path)?, &name)?;
             (path.to_owned(), reader.header().data_offset, reader.stream_header())

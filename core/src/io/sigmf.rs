@@ -63,7 +63,7 @@ pub struct SigmfGlobal {
     /// Number of the file's first frame, where a recording was split into several files.
     #[serde(rename = "core:offset", default, skip_serializing_if = "is_zero")]
     pub offset: u64,
-    /// Bytes after the last frame that are not samples; 0, or the recording is not read.
+    /// Bytes after the last frame that are not samples.
     #[serde(rename = "core:trailing_bytes", default, skip_serializing_if = "is_zero")]
     pub trailing_bytes: u64,
     /// Whether the samples were left out on purpose.
@@ -100,7 +100,7 @@ pub struct SigmfCapture {
     /// Number of its first frame at the converter, which counts lost frames too.
     #[serde(rename = "core:global_index", default, skip_serializing_if = "Option::is_none")]
     pub global_index: Option<u64>,
-    /// Bytes before the capture's first frame that are not samples; 0, or the recording is not read.
+    /// Bytes before the capture's first frame that are not samples.
     #[serde(rename = "core:header_bytes", default, skip_serializing_if = "is_zero")]
     pub header_bytes: u64,
     /// Date and time, frequency, and all other members.
@@ -155,12 +155,6 @@ impl SigmfMeta {
                 "core:metadata_only is true, so there are no samples; give a recording".into(),
             ));
         }
-        if meta.global.trailing_bytes > 0 || meta.captures.iter().any(|capture| capture.header_bytes > 0) {
-            return Err(fault(
-                "core:header_bytes or core:trailing_bytes say that the file holds more than samples; write the samples alone"
-                    .into(),
-            ));
-        }
         if let Some(name) = meta.required_extension() {
             return Err(fault(format!(
                 "it needs the extension \"{}\", which is unknown here; convert the recording to one without",
@@ -189,6 +183,11 @@ impl SigmfMeta {
         let extensions = self.global.other.get("core:extensions")?.as_array()?;
         let required = |extension: &&Value| extension.get("optional") == Some(&Value::Bool(false));
         extensions.iter().find(required)?.get("name")?.as_str()
+    }
+
+    /// The SHA-512 of the file of samples, in hexadecimal digits, if it is stated.
+    pub(super) fn sha512(&self) -> Option<&str> {
+        self.global.other.get("core:sha512")?.as_str()
     }
 
     /// The format of the numbers of the data type.

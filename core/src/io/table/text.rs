@@ -47,8 +47,7 @@ impl<R: Read> Lines<R> {
                 _ => {}
             }
             if self.line.contains(&0) {
-                return Err(self
-                    .fault("it has a byte of zero: it is no text, or text in UTF-16; save tables in UTF-8"));
+                return Err(self.fault("it has a byte of zero: it is no text, or text in UTF-16; save tables in UTF-8"));
             }
             self.decode_as_utf8();
             if !self.line.trim_ascii().is_empty() {
