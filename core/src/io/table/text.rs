@@ -1,16 +1,101 @@
-//! Lines of text, in UTF-8 or Latin-1, as they come.
+//! Lines of text, in UTF-8, UTF-16 or Windows-1252 (Latin-1), as they come.
 
 use crate::io::IoError;
-use std::io::{BufRead, BufReader, Read};
+use encoding_rs::{Decoder, UTF_16BE, UTF_16LE, WINDOWS_1252};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read};
 
 /// Longest line.
 const LONGEST_LINE: u64 = 1 << 20;
+/// Bytes of UTF-16 that are decoded at a time.
+const DECODED: usize = 1 << 16;
 /// The byte order mark in UTF-8.
 const MARK: &[u8] = "\u{feff}".as_bytes();
 
+/// Bytes in which UTF-16 has become UTF-8.
+struct Decoded<R> {
+    inner: R,
+    encoding: Encoding,
+    /// Text that is ready, and how much of it was given.
+    ready: String,
+    given: usize,
+    /// The decoder has come to the end.
+    is_over: bool,
+}
+
+enum Encoding {
+    /// Nothing was read yet.
+    Unknown,
+    /// ASCII and its supersets, after the first bytes.
+    Bytes {
+        head: [u8; 2],
+        left: usize,
+    },
+    Utf16(Box<Decoder>),
+}
+
+impl<R: Read> Decoded<R> {
+    /// Tells the encoding by the first two bytes: a mark, or a character below 256 with a byte of zero.
+    fn begin(&mut self) -> io::Result<()> {
+        let mut head = [0; 2];
+        let mut left = 0;
+        while left < 2 {
+            match self.inner.read(&mut head[left..]) {
+                Ok(0) => break,
+                Ok(count) => left += count,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+        let utf16 = match head {
+            [0xff, 0xfe] | [1..=255, 0] if left == 2 => UTF_16LE,
+            [0xfe, 0xff] | [0, 1..=255] if left == 2 => UTF_16BE,
+            _ => {
+                head.copy_within(..left, 2 - left);
+                self.encoding = Encoding::Bytes { head, left };
+                return Ok(());
+            }
+        };
+        let mut decoder = Box::new(utf16.new_decoder_with_bom_removal());
+        self.ready.reserve(8);
+        let _ = decoder.decode_to_string(&head, &mut self.ready, false);
+        self.encoding = Encoding::Utf16(decoder);
+        Ok(())
+    }
+}
+
+impl<R: Read> Read for Decoded<R> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        if let Encoding::Unknown = self.encoding {
+            self.begin()?;
+        }
+        let decoder = match &mut self.encoding {
+            Encoding::Bytes { left: 0, .. } | Encoding::Unknown => return self.inner.read(bytes),
+            Encoding::Bytes { head, left } => {
+                let count = (&head[2 - *left..]).read(bytes)?;
+                *left -= count;
+                return Ok(count);
+            }
+            Encoding::Utf16(decoder) => decoder,
+        };
+        while self.given == self.ready.len() && !self.is_over {
+            self.ready.clear();
+            self.given = 0;
+            let mut raw = [0; DECODED];
+            let count = self.inner.read(&mut raw)?;
+            // What is no text becomes the replacement character, which is in no number.
+            self.ready.reserve(decoder.max_utf8_buffer_length(count).unwrap_or(4 * DECODED));
+            self.is_over = count == 0;
+            let _ = decoder.decode_to_string(&raw[..count], &mut self.ready, self.is_over);
+        }
+        let count = (&self.ready.as_bytes()[self.given..]).read(bytes)?;
+        self.given += count;
+        Ok(count)
+    }
+}
+
 /// The lines of a file that hold more than spaces.
 pub(super) struct Lines<R> {
-    reader: BufReader<R>,
+    reader: BufReader<Decoded<R>>,
     file: String,
     kind: &'static str,
     /// Number of the last line, from 1.
@@ -22,7 +107,9 @@ impl<R: Read> Lines<R> {
     /// Of a file that is called `file` in messages, and should be of this kind. `buffer` bytes are read at a
     /// time.
     pub(super) fn new(inner: R, file: &str, kind: &'static str, buffer: usize) -> Self {
-        let reader = BufReader::with_capacity(buffer, inner);
+        let decoded =
+            Decoded { inner, encoding: Encoding::Unknown, ready: String::new(), given: 0, is_over: false };
+        let reader = BufReader::with_capacity(buffer, decoded);
         Self { reader, file: file.to_owned(), kind, number: 0, line: Vec::new() }
     }
 
@@ -47,7 +134,7 @@ impl<R: Read> Lines<R> {
                 _ => {}
             }
             if self.line.contains(&0) {
-                return Err(self.fault("it has a byte of zero: it is no text, or text in UTF-16; save tables in UTF-8"));
+                return Err(self.fault("it is not text; this is no table of numbers"));
             }
             self.decode_as_utf8();
             if !self.line.trim_ascii().is_empty() {
@@ -75,13 +162,13 @@ impl<R: Read> Lines<R> {
         Ok(())
     }
 
-    /// A line that is not UTF-8 is Latin-1, whose bytes are the first characters of Unicode.
+    /// A line that is not UTF-8 is Windows-1252, which has Latin-1 in it.
     fn decode_as_utf8(&mut self) {
         if self.number == 1 && self.line.starts_with(MARK) {
             self.line.drain(..MARK.len());
         }
         if !self.line.is_ascii() && str::from_utf8(&self.line).is_err() {
-            self.line = self.line.iter().map(|byte| char::from(*byte)).collect::<String>().into_bytes();
+            self.line = WINDOWS_1252.decode_without_bom_handling(&self.line).0.into_owned().into_bytes();
         }
     }
 
