@@ -1,12 +1,12 @@
 //! Missing samples on the command line: their estimates, the report, the mask file.
 
 use super::print::say_line;
-use super::print::{Failure, InFile};
+use super::print::{Failure, InFile, failed};
 use super::written::begin_beside;
 use hybank::bank::Bank;
 use hybank::design::MissingSamples;
 use hybank::files::AtomicFile;
-use hybank::io::{ReadOptions, Until};
+use hybank::io::{LostSamples, MAX_LOST, ReadOptions, Until};
 use hybank::messages::Quoted;
 use hybank::pipeline::{GapEstimator, GapSummary};
 use std::path::{Path, PathBuf};
@@ -18,14 +18,24 @@ const REPORTED: usize = 10;
 /// Options of the commands that can estimate missing samples.
 #[derive(Debug, clap::Args)]
 pub(super) struct GapArgs {
-    /// Estimate missing samples from all those around them, and report them. They are NaN, or jumps of SigMF
-    /// `core:global_index`. The bank needs its spec
+    /// Estimate missing samples from all those around them, and report them. They are NaN, jumps of SigMF
+    /// `core:global_index`, or in the file of --lost. The bank needs its spec
     #[arg(long)]
     gaps: bool,
     /// Write one byte per output sample: 0 where no missing sample affects it, else its predicted SNR in
     /// whole decibels, from 1 to 255
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
+    /// File of JSON lines that name lost samples. {"channel": 1, "sample_start": 5, "global_index": 8}:
+    /// sample 5 of the input was number 8 at the converter; the first such line of a channel is about its
+    /// sample 0. {"channel": 2, "first": 40, "length": 3}:
+    /// samples 40 to 42 are invalid
+    #[arg(long, value_name = "FILE")]
+    lost: Option<PathBuf>,
+    /// The most frames (one sample of each channel of an input) that an input may leave out in all; more are
+    /// an error, because a number is probably wrong [default: 67108864]
+    #[arg(long, value_name = "FRAMES")]
+    max_lost: Option<u64>,
     /// Continue until the last channel ends; the missing ends of the other channels are gaps
     #[arg(long)]
     longest: bool,
@@ -49,8 +59,23 @@ impl GapArgs {
 
     /// An option that is given and means nothing without --gaps.
     fn only_with_gaps(&self) -> Option<&'static str> {
-        let given = [("--mask", self.mask.is_some()), ("--longest", self.longest)];
+        let given = [
+            ("--mask", self.mask.is_some()),
+            ("--lost", self.lost.is_some()),
+            ("--max-lost", self.max_lost.is_some()),
+            ("--longest", self.longest),
+        ];
         given.into_iter().find_map(|(option, is_given)| is_given.then_some(option))
+    }
+
+    /// Reads the file of lost samples, if one is given.
+    pub(super) fn lost_samples(&self) -> Result<Option<LostSamples>, Failure> {
+        self.lost().map(LostSamples::read).transpose().map_err(failed)
+    }
+
+    /// The file of lost samples.
+    pub(super) fn lost(&self) -> Option<&Path> {
+        self.lost.as_deref()
     }
 
     /// The mask file.
@@ -59,8 +84,13 @@ impl GapArgs {
     }
 
     /// The options of reading that concern gaps; the others are those of `options`.
-    pub(super) fn read_options<'a>(&self, options: ReadOptions<'a>) -> ReadOptions<'a> {
-        ReadOptions { until: if self.longest { Until::Longest } else { Until::Shortest }, ..options }
+    pub(super) fn read_options<'a>(
+        &self,
+        lost: Option<&'a LostSamples>,
+        options: ReadOptions<'a>,
+    ) -> ReadOptions<'a> {
+        let until = if self.longest { Until::Longest } else { Until::Shortest };
+        ReadOptions { lost, until, max_lost: self.max_lost.unwrap_or(MAX_LOST), ..options }
     }
 
     /// Whether missing samples are estimated.

@@ -85,7 +85,8 @@ impl RunArgs {
         self.gaps.check()?;
         self.interleaved.check(inputs.len())?;
         self.observer.check(output, self.json || prints)?;
-        let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).chain([bank]).collect();
+        let inputs = inputs.iter().map(PathBuf::as_path).chain([bank]);
+        let inputs: Vec<&Path> = inputs.chain(self.gaps.lost()).collect();
         let others = self.gaps.mask().into_iter().chain(self.observer.report());
         check_files(output, container, &others.collect::<Vec<&Path>>(), &inputs)
     }
@@ -132,12 +133,13 @@ impl BankRun<'_> {
         on_stall: OnStall<'_>,
     ) -> Result<MultiReader, Failure> {
         let args = self.args;
+        let lost = args.gaps.lost_samples()?;
         let converters = Converters::from(self.bank);
         let interleaving = args.interleaved.interleaving(&converters, self.bank_path)?;
         // Each thread takes about a block at a time, and more threads gain little.
         let block_bytes = if args.threads == 1 { BLOCK_BYTES } else { 8 * BLOCK_BYTES };
         let own = converters.options(format, inputs.len(), interleaving.as_ref());
-        let files = args.gaps.read_options(ReadOptions { block_bytes, ..own });
+        let files = args.gaps.read_options(lost.as_ref(), ReadOptions { block_bytes, ..own });
         let started = MultiReader::start(inputs, files, on_stall);
         started.map_err(unreadable)
     }

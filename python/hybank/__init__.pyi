@@ -339,6 +339,8 @@ def read(
     iq: bool = False,
     full_scale: float | str | None = None,
     interleaved: int | None = None,
+    lost: _Path | None = None,
+    max_lost: int | None = None,
     longest: bool = False,
     skip_lines: int = 0,
     columns: Sequence[int | str] | None = None,

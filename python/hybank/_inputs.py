@@ -50,7 +50,7 @@ def _are_files(x):
 @checked
 def read(
     files, *, bank=None, format="wav", channels=None, channel=None, iq=False, full_scale=None,
-    interleaved=None, longest=False, skip_lines=0, columns=None, time_column=None, delimiter=None,
+    interleaved=None, lost=None, max_lost=None, longest=False, skip_lines=0, columns=None, time_column=None, delimiter=None,
     decimal=None
 ):
     """Read recordings as ``hybank fuse`` reads them.
@@ -73,6 +73,10 @@ def read(
         Full scale of the converters: a number, or "12bits", "u12bits". WAV and FLAC state it, the bank may.
     interleaved : int, optional
         One recording of one channel in which so many converters take turns; needs `bank`.
+    lost : str or os.PathLike, optional
+        A file of JSON lines that name lost samples.
+    max_lost : int, optional
+        The most frames that an input may leave out.
     longest : bool
         Read until the last channel ends; the others are NaN from their ends on.
     skip_lines : int
@@ -103,7 +107,7 @@ def read(
     options = {
         "format": format, "channels": channels, "channel": channel,
         "iq": iq, "full_scale": full_scale, "interleaved": interleaved,
-        "longest": longest, "skip_lines": skip_lines,
+        "lost": lost, "max_lost": max_lost, "longest": longest, "skip_lines": skip_lines,
         "columns": [str(column) for column in columns or ()],
         "time_column": None if time_column is None else str(time_column), "delimiter": delimiter, "decimal": decimal,
     }
@@ -114,7 +118,7 @@ def _read(files, source, options):
     """Recordings for a bank, for a spec, or for nothing in particular."""
     names = [files] if isinstance(files, (str, os.PathLike)) else list(files)
     usual = dict.fromkeys(
-        ("channels", "channel", "full_scale", "interleaved", "time_column", "delimiter", "decimal")
+        ("channels", "channel", "full_scale", "interleaved", "lost", "max_lost", "time_column", "delimiter", "decimal")
     )
     options = {"format": "wav", "iq": False, "longest": False, "skip_lines": 0, "columns": [], **usual, **options}
     found = _hybank.read(names, options, source)

@@ -2,12 +2,12 @@
 
 use crate::arrays::{ArrayShape, Held};
 use crate::bank::Bank;
-use crate::errors::{capture_error, refused, warn};
+use crate::errors::{capture_error, io_error, refused, warn};
 use crate::formats;
 use crate::sources;
 use hybank::captures::{CaptureError, Captures, ChannelSamples, Converters, FileFormat};
 use hybank::io::table::{TableOptions, TimeColumn};
-use hybank::io::{MultiReader, ReadOptions, TimeInterleaving, Until};
+use hybank::io::{LostSamples, MAX_LOST, MultiReader, ReadOptions, TimeInterleaving, Until};
 use hybank::pipeline::matching;
 use numpy::{Complex64, PyArray1};
 use pyo3::prelude::*;
@@ -28,6 +28,8 @@ pub(crate) struct CaptureOptions<'py> {
     iq: bool,
     full_scale: Option<Bound<'py, PyAny>>,
     interleaved: Option<usize>,
+    lost: Option<PathBuf>,
+    max_lost: Option<u64>,
     longest: bool,
     skip_lines: u64,
     columns: Vec<String>,
@@ -76,13 +78,18 @@ fn read_for<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let turns = options.interleaved.zip(converters);
     let turns = turns.map(|(count, converters)| in_turn(converters, count)).transpose()?;
+    let lost = options.lost.as_deref().map(LostSamples::read).transpose().map_err(io_error)?;
     let format = options.format()?;
     let own = match converters {
         Some(converters) => converters.options(format, files.len(), turns.as_ref()),
         None => format.options(files.len(), 1),
     };
-    let until = if options.longest { Until::Longest } else { Until::Shortest };
-    let read_options = ReadOptions { until, ..own };
+    let read_options = ReadOptions {
+        lost: lost.as_ref(),
+        max_lost: options.max_lost.unwrap_or(MAX_LOST),
+        until: if options.longest { Until::Longest } else { Until::Shortest },
+        ..own
+    };
     let read = py.detach(|| -> Result<_, CaptureError> {
         let mut reader = MultiReader::start(files, read_options, &mut |_| {})?;
         let output_rate = converters.map(|converters| converters.check("the bank", &reader));

@@ -192,6 +192,8 @@ def test_a_missing_file_is_a_file_not_found_error(folder, bank, name):
         hb.Recording(folder / "nix.sigmf-meta")
     with pytest.raises(FileNotFoundError):
         hb.simulate(bank, str(folder / "nix.wav"))
+    with pytest.raises(FileNotFoundError):
+        hb.read(folder / "is.wav", lost=folder / "nix.jsonl")
     # A file that is there and is none of its kind stays a refusal.
     (folder / "bad.wav").write_text("bad")
     with pytest.raises(hb.HybankError, match="bad.wav"):

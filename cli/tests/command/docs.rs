@@ -77,6 +77,7 @@ impl Folder {
             "json" => self.check_bank(snippet),
             "sh" => self.run(snippet),
             "text" => self.check_text(snippet),
+            "jsonl" => self.desk.write("lost.jsonl", &snippet.text),
             // Python has tests of its own; Rust is a documentation test.
             "rust" | "python" | "text illustration" => {}
             "c" => self.desk.write(self.name(snippet, "// "), &snippet.text),

@@ -7,6 +7,14 @@ use trials::random::Random;
 const COUNT: usize = 3000;
 
 /// Channel 1 joins two frames late and loses frame 7 and frames 100..1500; channel 2 is whole.
+const SEQUENCE: &str = r#"
+{"channel": 1, "sample_start": 0, "global_index": 1002}
+{"channel": 1, "sample_start": 5, "global_index": 1008}
+
+{"channel": 1, "sample_start": 97, "global_index": 2500}
+{"channel": 2, "sample_start": 0, "global_index": 1000}
+"#;
+
 fn is_lost(frame: usize) -> bool {
     frame < 2 || frame == 7 || (100..1500).contains(&frame)
 }
@@ -34,6 +42,61 @@ fn check_mask(mask: &[u8], got: &[f32], whole: &[f32]) {
 /// Samples that nothing around them tells.
 fn whole() -> Vec<f32> {
     (0..2 * COUNT).map(|i| (1 + i % 1021) as f32).collect()
+}
+
+#[test]
+fn samples_that_were_left_out_are_bridged_reported_and_masked() {
+    let desk = Desk::with_model();
+    let whole = whole();
+    desk.write("a", bytes(&kept(&whole)));
+    desk.write("b", bytes(&channel(&whole, 1)));
+    wav::write(&desk, "a.wav", 1, 24_000, &kept(&whole));
+    wav::write(&desk, "b.wav", 1, 24_000, &channel(&whole, 1));
+    desk.write("lost.jsonl", SEQUENCE);
+    let lost = ["--lost", "lost.jsonl", "--mask", "mask"];
+    let stream = ["stream", "bank.json", "--input", "a", "--input", "b", "-o", "out"];
+    let fuse = ["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--keep-latency"];
+    let mut outputs = Vec::new();
+    for command in [&stream[..], &fuse] {
+        let report = desk.report(&[command, &lost, &["--gaps"]].concat());
+        assert_eq!(places(&report["gaps"]), [[1, 0, 2], [1, 7, 1], [1, 100, 1400]]);
+        assert_eq!((report["gaps"]["missing"].as_u64(), report["frames"].as_u64()), (Some(1403), Some(3000)));
+        assert_eq!(report["replaced"], 0);
+        let got = match command[0] {
+            "stream" => floats(&desk.read("out")),
+            _ => wav::samples(&desk, "out.wav"),
+        };
+        check_mask(&desk.read("mask"), &got, &fused(&whole));
+        outputs.push((got, desk.read("mask")));
+    }
+    assert!(outputs[0] == outputs[1]);
+}
+
+#[test]
+fn void_samples_of_an_interleaved_stream_are_in_the_report_of_another_run() {
+    let desk = Desk::with_model();
+    let clean = frames(500);
+    let mut marked = clean.clone();
+    for (channel, range) in [(0, 0..1), (1, 40..43), (0, 41..300), (1, 499..500)] {
+        range.for_each(|k: usize| marked[2 * k + channel] = f32::NAN);
+    }
+    desk.write("marked", bytes(&marked));
+    let args = ["stream", "bank.json", "--gaps", "--mask", "mask", "-o", "out"];
+    let report = desk.report(&[&args[..], &["--input", "marked"]].concat());
+    let list = report["gaps"]["list"].as_array().unwrap();
+    assert_eq!(list.len(), 4);
+    let (out, mask) = (desk.read("out"), desk.read("mask"));
+    // The same gaps with anything else in their place, as integers that cannot say NaN.
+    let lines: Vec<_> = list.iter().map(Value::to_string).collect();
+    desk.write("void.jsonl", lines.join("\n"));
+    let coded: Vec<u8> = clean.iter().flat_map(|x| ((x * 1024.0) as i16).to_be_bytes()).collect();
+    desk.write("coded", coded);
+    let format =
+        ["--input", "coded", "--format", "s16be", "--output-format", "f32le", "--lost", "void.jsonl"];
+    let again = desk.report(&[&args[..], &format].concat());
+    assert_eq!(again["gaps"], report["gaps"]);
+    let scaled: Vec<f32> = floats(&out).iter().map(|y| y / 32.0).collect();
+    assert_eq!((floats(&desk.read("out")), desk.read("mask")), (scaled, mask));
 }
 
 #[test]
@@ -87,7 +150,7 @@ fn sigmf_that_is_not_all_samples_is_read_or_refused() {
 }
 
 #[test]
-fn samples_that_were_left_out_are_bridged_reported_and_masked() {
+fn captures_tell_stream_what_was_lost() {
     let desk = Desk::with_model();
     let whole = whole();
     let captures = r#"{ "core:sample_start": 10, "core:global_index": 1002 },
@@ -102,19 +165,17 @@ fn samples_that_were_left_out_are_bridged_reported_and_masked() {
         meta("rf32_le", 1, r#"{ "core:sample_start": 0, "core:global_index": 1000 }"#),
     );
     desk.write("b.sigmf-data", bytes(&channel(&whole, 1)));
-    let stream = ["stream", "bank.json", "--input", "a.sigmf-meta", "--input", "b.sigmf-meta", "-o", "out"];
-    let fuse = ["fuse", "bank.json", "a.sigmf-meta", "b.sigmf-meta", "-o", "out.wav", "--keep-latency"];
-    for command in [&stream[..], &fuse] {
-        let report = desk.report(&[command, &["--gaps", "--mask", "mask"]].concat());
-        assert_eq!(places(&report["gaps"]), [[1, 0, 2], [1, 7, 1], [1, 100, 1400]]);
-        assert_eq!((report["gaps"]["missing"].as_u64(), report["frames"].as_u64()), (Some(1403), Some(3000)));
-        assert_eq!(report["replaced"], 0);
-        let got = match command[0] {
-            "stream" => floats(&desk.read("out")),
-            _ => wav::samples(&desk, "out.wav"),
-        };
-        check_mask(&desk.read("mask"), &got, &fused(&whole));
-    }
+    let args = ["stream", "bank.json", "--input", "a.sigmf-meta", "--input", "b.sigmf-meta", "-o", "out"];
+    let report = desk.report(&[&args[..], &["--gaps", "--mask", "mask"]].concat());
+    assert_eq!(places(&report["gaps"]), [[1, 0, 2], [1, 7, 1], [1, 100, 1400]]);
+    let got = floats(&desk.read("out"));
+    check_mask(&desk.read("mask"), &got, &fused(&whole));
+    // What is void is reported beside the captures; what is left out only once.
+    desk.write("lost", r#"{"channel": 2, "first": 2990, "length": 3}"#);
+    let both = [&args[..], &["--gaps", "--lost", "lost"]].concat();
+    assert_eq!(places(&desk.report(&both)["gaps"])[3], [2, 2990, 3]);
+    desk.write("lost", r#"{"channel": 2, "sample_start": 0, "global_index": 3}"#);
+    desk.refused(1, &[&both[..], &["--force"]].concat(), &["b.sigmf-meta", "captures of its own"]);
 }
 
 /// Two converters of 24 kS/s, with their bank for a band of 18 kHz.

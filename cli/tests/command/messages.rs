@@ -38,7 +38,9 @@ fn a_mask_is_a_file() {
 #[test]
 fn options_about_missing_samples_need_gaps() {
     let desk = desk();
-    for (option, value) in [("--mask", Some("m")), ("--longest", None)] {
+    for (option, value) in
+        [("--mask", Some("m")), ("--lost", Some("l")), ("--max-lost", Some("3")), ("--longest", None)]
+    {
         let args: Vec<&str> = [option].into_iter().chain(value).collect();
         let said = desk.refused(2, &fuse(&args), &[option, "without --gaps", "give it too"]);
         assert!(!said.contains("required arguments"), "{said}");

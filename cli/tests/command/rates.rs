@@ -1,6 +1,6 @@
 //! Converters with rates of their own, from the spec to the fused recording, as a user runs it.
 
-use crate::support::{Desk, bytes, text, wav};
+use crate::support::{Desk, text, wav};
 use serde_json::Value;
 
 /// 24 kHz and 16 kHz into 48 kHz; frames of 6 samples from 3 and 2.
@@ -145,23 +145,17 @@ fn lost_samples_count_for_their_converter() {
     nan[100..107].fill(f32::NAN);
     left_out.drain(100..107);
     wav::write(&desk, "nan.wav", 1, 24_000, &nan);
-    let captures = r#"{"core:sample_start": 0, "core:global_index": 0}, {"core:sample_start": 100, "core:global_index": 107}"#;
-    desk.write(
-        "out.sigmf-meta",
-        format!(
-            r#"{{"global": {{"core:datatype": "rf32_le", "core:sample_rate": 24000}}, "captures": [{captures}]}}"#
-        ),
-    );
-    desk.write("out.sigmf-data", bytes(&left_out));
-    let mut invalid = b.clone();
-    invalid[40..43].fill(f32::NAN);
-    wav::write(&desk, "invalid.wav", 1, 16_000, &invalid);
+    wav::write(&desk, "out.wav", 1, 24_000, &left_out);
     wav::write(&desk, "b.wav", 1, 16_000, &b);
-    let fuse =
-        |a: &str, output: &str| fused(&desk, [a, "invalid.wav"], output, &["--gaps", "--mask", "mask"]);
-    let marked = fuse("nan.wav", "one.wav");
+    let lines = "{\"channel\": 1, \"sample_start\": 0, \"global_index\": 0}\n{\"channel\": 1, \"sample_start\": 100, \"global_index\": 107}\n{\"channel\": 2, \"first\": 40, \"length\": 3}\n";
+    desk.write("lost.jsonl", lines);
+    desk.write("invalid.jsonl", lines.lines().last().unwrap());
+    let fuse = |a: &str, lost: &str, output: &str| {
+        fused(&desk, [a, "b.wav"], output, &["--lost", lost, "--gaps", "--mask", "mask"])
+    };
+    let marked = fuse("nan.wav", "invalid.jsonl", "one.wav");
     let mask = desk.read("mask");
-    let cut = fuse("out.sigmf-meta", "two.wav");
+    let cut = fuse("out.wav", "lost.jsonl", "two.wav");
     for report in [&marked, &cut] {
         assert_eq!(report["gaps"]["count"], 2, "{report}");
         let place =

@@ -76,6 +76,7 @@ fn recordings(text: &str) -> Vec<Case> {
         case("rows.npy", bytes, "fuse bank.json rows.npy -o out.wav")
     };
     let wav = |bytes: &[u8]| case("a.wav", bytes, "fuse bank.json a.wav b.wav -o out.wav");
+    let lost = |line: String| case("lost", line, "fuse bank.json a.wav b.wav --gaps --lost lost -o out.wav");
     let table = |text: String| case("both.csv", text, "fuse bank.json both.csv -o out.wav");
     vec![
         table(format!("time,{cell},b\n0,1,2\n1,{cell},4\n")),
@@ -95,6 +96,9 @@ fn recordings(text: &str) -> Vec<Case> {
         npy(format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}), }}", "1, ".repeat(20_000))),
         wav(&text.as_bytes()[..16.min(text.len())]),
         wav(&[b"RIFF\x24\0\0\0".as_slice(), text.as_bytes()].concat()),
+        lost(format!("{{{json}: 1}}")),
+        lost(format!("{{\"first\": {json}, \"length\": 1}}")),
+        lost(text.to_owned()),
         case("low.s2p", format!("# GHz S MA\n1 2 {text}\n"), "design measured.toml -o out.json"),
         case("low.s2p", format!("# {text}\n1 2 3\n"), "design measured.toml -o out.json"),
         case("bode.csv", format!("{text}\n1,2,3\n"), "design bode.toml -o out.json"),
@@ -170,6 +174,7 @@ fn foreign_names_and_arguments_are_quoted_and_bounded() {
             &["verify", text],
             &["fuse", "bank.json", text, "b.wav", "-o", "out.wav"],
             &["fuse", "bank.json", "a.wav", "b.wav", "-o", text],
+            &["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--gaps", "--lost", text],
             &["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--gaps", text],
             &["stream", "bank.json", "--input", text, "-o", "out"],
             &["stream", "bank.json", "--format", text],

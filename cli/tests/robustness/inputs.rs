@@ -12,7 +12,7 @@ use trials::rounds;
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The file that is damaged, and the run that reads it.
-const RUNS: [(&str, &str); 9] = [
+const RUNS: [(&str, &str); 10] = [
     ("bank.json", "fuse bank.json a.wav b.wav -o out.wav --force"),
     ("designed.json", "verify designed.json"),
     ("designed.json", "analyze designed.json"),
@@ -22,10 +22,15 @@ const RUNS: [(&str, &str); 9] = [
     ("both.sigmf-data", "stream bank.json --input both.sigmf-meta --gaps -o out --force"),
     ("both.csv", "fuse bank.json both.csv -o out.wav --force"),
     ("rows.npy", "fuse bank.json rows.npy -o out.wav --force"),
+    ("lost", "stream bank.json --input raw --gaps --lost lost -o out --force"),
 ];
 
 const META: &str = r#"{ "global": { "core:datatype": "rf32_le", "core:num_channels": 2, "core:version": "1.0.0" },
     "captures": [{ "core:sample_start": 0, "core:global_index": 7 }, { "core:sample_start": 9, "core:global_index": 30 }] }"#;
+const LOST: &str = r#"{"sample_start": 0, "global_index": 3}
+{"sample_start": 5, "global_index": 12}
+{"channel": 2, "first": 4, "length": 3}
+"#;
 
 fn desk() -> Desk {
     let desk = crate::desk();
@@ -35,6 +40,7 @@ fn desk() -> Desk {
     desk.write("raw", &raw);
     desk.write("both.sigmf-data", &raw);
     desk.write("both.sigmf-meta", META);
+    desk.write("lost", LOST);
     desk.write("both.csv", "time,a,b\n0.0,1,2\n0.5,,4\n1.0,5,6\n");
     let header =
         "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 40), }".to_owned() + &" ".repeat(55) + "\n";

@@ -7,7 +7,7 @@ use hybank::bank::Bank;
 use hybank::interchange::{taps_of_csv, taps_of_npy};
 use hybank::io::table::{TableOptions, TableReader};
 use hybank::io::wav::WavReader;
-use hybank::io::{SigmfMeta, npy_header, open_mat};
+use hybank::io::{LostSamples, SigmfMeta, npy_header, open_mat};
 use hybank::messages::shown;
 use hybank::spec::Spec;
 use std::fs;
@@ -131,6 +131,16 @@ fn arrays_of_matlab() {
         }
     });
     assert!(answers > 1000 && refusals > 1000, "{answers} {refusals}");
+}
+
+#[test]
+fn lost_samples() {
+    let mut answers = 0;
+    damaged("lost", |bytes| {
+        let text = String::from_utf8_lossy(bytes);
+        answers += usize::from(answered(LostSamples::parse(&text, "seed")).is_some());
+    });
+    assert!((20..rounds(COPIES)).contains(&answers), "{answers}");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use super::StreamHeader;
 use super::block::{Block, RecordedFrames};
+use super::lost::{Dropout, LostInInput};
 use super::timestamps::Break;
 use std::collections::VecDeque;
 
@@ -20,6 +21,7 @@ pub(super) struct AlignedInput {
     ended: bool,
     /// The breaks ahead, in their order.
     breaks: VecDeque<Break>,
+    dropouts: Dropouts,
     /// Frames of the input that are over.
     frames: u64,
     /// Frames in place of those that are lost; made when the first one is.
@@ -34,14 +36,16 @@ impl AlignedInput {
             used: 0,
             ended: false,
             breaks: VecDeque::new(),
+            dropouts: Dropouts::default(),
             frames: 0,
             lost: Block::default(),
         }
     }
 
     /// Sets the lost frames; to be called before the first frame is used.
-    pub(super) fn lose(&mut self, breaks: VecDeque<Break>) {
+    pub(super) fn lose(&mut self, breaks: VecDeque<Break>, lost: LostInInput) {
         self.breaks = breaks;
+        self.dropouts = Dropouts::new(lost.dropouts, self.header.channels);
     }
 
     /// The break at the next frame.
@@ -98,17 +102,24 @@ impl AlignedInput {
 
     /// Frames that are at hand and alike.
     pub(super) fn ready(&self) -> usize {
+        let change = clamp(self.dropouts.until_change());
         if let Some(Break { lost, .. }) = self.at_break() {
-            return clamp(lost).min(LOST_FRAMES);
+            return clamp(lost).min(LOST_FRAMES).min(change);
         }
         let until_break = self.breaks.front().map_or(usize::MAX, |next| clamp(next.frame - self.frames));
-        self.left().min(until_break)
+        self.left().min(until_break).min(change)
     }
 
     /// Makes `frames` frames visible: at most those that are ready, or any number once the input is over.
     pub(super) fn prepare(&mut self, frames: usize) {
-        if self.is_lost() && self.lost.frames() < frames {
-            self.lost = Block::missing(&self.header, frames.max(LOST_FRAMES));
+        if self.is_lost() {
+            if self.lost.frames() < frames {
+                self.lost = Block::missing(&self.header, frames.max(LOST_FRAMES));
+            }
+        } else if self.dropouts.any() {
+            let (dropouts, block) = (&self.dropouts, &mut self.block);
+            let invalid = (0..self.header.channels).filter(|channel| dropouts.covers(*channel));
+            invalid.for_each(|channel| block.lose(channel, self.used..self.used + frames));
         }
     }
 
@@ -131,6 +142,7 @@ impl AlignedInput {
     /// Advances by `frames` frames.
     pub(super) fn advance(&mut self, frames: usize) {
         let (is_break, is_over) = (self.at_break().is_some(), self.is_over());
+        self.dropouts.advance(frames as u64);
         if is_break {
             self.breaks.front_mut().into_iter().for_each(|next| next.lost -= frames as u64);
         } else if !is_over {
@@ -145,6 +157,76 @@ impl AlignedInput {
 
 fn clamp(count: u64) -> usize {
     usize::try_from(count).unwrap_or(usize::MAX)
+}
+
+/// The dropouts of an input, seen from the current frame.
+///
+/// Each channel needs only the frame at which its validity returns, so overlapping dropouts cost no more
+/// than others: a dropout that begins while its channel is invalid moves that frame.
+#[derive(Debug, Default)]
+struct Dropouts {
+    /// The current frame.
+    time: u64,
+    /// Dropouts that lie ahead, in the order of their first frames.
+    ahead: VecDeque<Dropout>,
+    /// Each channel is invalid before this frame.
+    channels: Vec<u64>,
+    /// All channels are invalid before this frame.
+    all: u64,
+    /// The least of these frames that lies after the current one.
+    next_end: Option<u64>,
+}
+
+impl Dropouts {
+    /// Dropouts in the order of their first frames, for so many channels.
+    fn new(ahead: Vec<Dropout>, channels: usize) -> Self {
+        let mut dropouts = Self { ahead: ahead.into(), channels: vec![0; channels], ..Self::default() };
+        dropouts.enter();
+        dropouts
+    }
+
+    /// True if a channel is invalid at the current frame.
+    fn any(&self) -> bool {
+        self.next_end.is_some()
+    }
+
+    /// True if this channel is invalid at the current frame.
+    fn covers(&self, channel: usize) -> bool {
+        self.all.max(self.channels[channel]) > self.time
+    }
+
+    /// Frames from the current one on in which the same channels are invalid.
+    fn until_change(&self) -> u64 {
+        let next = self.ahead.front().map(|dropout| dropout.frames.start);
+        self.next_end.into_iter().chain(next).min().map_or(u64::MAX, |frame| frame - self.time)
+    }
+
+    /// Goes on by `frames` frames, at most to the next change.
+    fn advance(&mut self, frames: u64) {
+        let change = frames >= self.until_change();
+        self.time += frames;
+        if change {
+            self.enter();
+        }
+    }
+
+    /// Takes the dropouts that begin now, and those that begin while their channels are invalid anyway.
+    fn enter(&mut self) {
+        let time = self.time;
+        while let Some(dropout) = self.ahead.front() {
+            let end = match dropout.channel {
+                Some(channel) => &mut self.channels[channel],
+                None => &mut self.all,
+            };
+            if dropout.frames.start > time && (*end <= time || dropout.frames.start > *end) {
+                break;
+            }
+            *end = dropout.frames.end.max(*end);
+            self.ahead.pop_front();
+        }
+        let ends = self.channels.iter().copied().chain([self.all]);
+        self.next_end = ends.filter(|&end| end > time).min();
+    }
 }
 
 #[cfg(test)]

@@ -151,6 +151,16 @@ impl Block {
         }
     }
 
+    /// Marks the samples of a channel in some frames as missing.
+    pub(super) fn lose(&mut self, channel: usize, frames: Range<usize>) {
+        for part in &mut self.parts {
+            with_numbers!(part, numbers => {
+                let slots = numbers.iter_mut().skip(frames.start * self.channels + channel);
+                slots.step_by(self.channels).take(frames.len()).for_each(|slot| *slot = Sample::from_f64(f64::NAN));
+            });
+        }
+    }
+
     /// Leaves out all frames from this one on.
     pub(super) fn truncate(&mut self, frames: usize) {
         let length = frames * self.channels;

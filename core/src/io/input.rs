@@ -5,6 +5,7 @@ use super::block::Block;
 use super::capture::InputNotes;
 use super::frames::{InputFrames, Message};
 use super::grouped::GroupedInput;
+use super::lost::LostInInput;
 use super::open::InputSource;
 use super::pipe::is_file;
 use super::stall::{PATIENCE, Wait};
@@ -142,6 +143,20 @@ impl Input {
         }
     }
 
+    /// The input's own timestamps go together with dropouts given beside it, but not with other timestamps.
+    pub(super) fn take_timestamps(&mut self, lost: &mut LostInInput) -> Result<(), IoError> {
+        if self.notes.timestamps.is_empty() {
+            return Ok(());
+        }
+        if !lost.timestamps.is_empty() {
+            return Err(
+                self.unfit("it has captures of its own; leave out the lines with sample_start".into())
+            );
+        }
+        lost.timestamps = self.notes.timestamps.clone();
+        Ok(())
+    }
+
     pub(super) fn unfit(&self, problem: String) -> IoError {
         IoError::unfit(&self.name)(problem)
     }
@@ -166,4 +181,11 @@ impl Input {
         let at_least = promised.is_none() && !aligned.ended();
         (frames > 0).then_some(InputFault::Unused { frames, at_least })
     }
+}
+
+/// The message for more lost frames than are allowed.
+pub(super) fn too_many_lost(frames: u64, most: u64) -> String {
+    format!(
+        "{frames} frames were lost in all, more than {most}; check the numbers, or allow {frames} to be lost"
+    )
 }

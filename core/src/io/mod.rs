@@ -1,4 +1,5 @@
-//! Input and output of samples: WAV, SigMF, tables, NumPy and MATLAB arrays, raw PCM.
+//! Input and output of samples: WAV, SigMF, tables, NumPy and MATLAB arrays, raw PCM, and lists of lost
+//! samples.
 //!
 //! A *frame* holds one sample of each channel of a file or stream. A sample is stored in one of the
 //! [`PcmFormat`]s; the full scale of integer formats is 1.0.
@@ -38,6 +39,7 @@ mod frames;
 mod full_scale;
 mod grouped;
 mod input;
+mod lost;
 mod mat;
 mod mat_element;
 mod multi_reader;
@@ -65,6 +67,7 @@ pub use decoded::{DecodeError, DecodedFrames, Decoder};
 pub use error::{InputFault, InputWarning, IoError};
 pub use frame_file::FrameFile;
 pub use full_scale::{StatedScale, Word};
+pub use lost::LostSamples;
 pub use mat::{mat_variable, open_mat};
 pub use multi_reader::{Arrival, MultiReader};
 pub use notes::{OutputNotes, Placement};
@@ -78,3 +81,4 @@ pub use sample_writer::{Container, OutputHeader, SampleWriter};
 pub use sigmf::{SigmfAnnotation, SigmfCapture, SigmfGlobal, SigmfMeta, is_sigmf, sigmf_files};
 pub use stall::{OnStall, Stall};
 pub use stream_header::{Coding, StreamHeader, is_same_rate};
+pub use timestamps::{MAX_LOST, MAX_LOST_AT_ONCE};

@@ -5,12 +5,12 @@
 //! consumer. If the consumer is slow, reading stops, and so do the writers of the pipes.
 
 use super::grouped::GroupedInput;
-use super::input::{BLOCKS, Input};
+use super::input::{BLOCKS, Input, too_many_lost};
+use super::lost::{LostInInput, LostSamples};
 use super::notes::{OutputNotes, Placement};
 use super::open::InputSource;
 use super::pipe::refuse_shared_pipes;
 use super::stall::{OnStall, Wait};
-use super::timestamps::MOST_LOST;
 use super::{InputWarning, IoError, ReadOptions, RecordedFrames, StreamHeader, Until};
 use crossbeam_channel::Receiver;
 use std::path::PathBuf;
@@ -41,6 +41,7 @@ pub struct MultiReader {
     inputs: Vec<Input>,
     stop: Receiver<()>,
     until: Until,
+    max_lost: u64,
     /// Number of the earliest frame at the converter.
     origin: u64,
     /// Frames at hand.
@@ -55,8 +56,9 @@ impl MultiReader {
     /// join late begin with lost samples.
     ///
     /// # Errors
-    /// [`IoError`] for an input that cannot be read or is not plain PCM, for a pipe that is given twice, for
-    /// too many lost samples, and for a thread that cannot be started.
+    /// [`IoError`] for an input that cannot be read or is not plain PCM, for a pipe that is given twice,
+    /// for lost samples that do not fit the inputs or are more than [`ReadOptions::max_lost`], and for a
+    /// thread that cannot be started.
     pub fn start(
         paths: &[PathBuf],
         options: ReadOptions<'_>,
@@ -94,13 +96,14 @@ impl MultiReader {
         // All threads first: opening a FIFO waits for its writer, in whatever order they come.
         let inputs = sources.into_iter().map(Input::on_thread);
         let inputs = inputs.collect::<Result<_, _>>()?;
-        let (stop, until) = (crossbeam_channel::never(), options.until);
-        let mut reader = Self { inputs, stop, until, origin: 0, ready: 0, consumed: 0 };
+        let ReadOptions { until, max_lost, lost, .. } = options;
+        let stop = crossbeam_channel::never();
+        let mut reader = Self { inputs, stop, until, max_lost, origin: 0, ready: 0, consumed: 0 };
         for i in 0..paths.len() {
             reader.receive(i, on_stall)?;
         }
         reader.refuse_some_complex()?;
-        reader.align()?;
+        reader.align(lost)?;
         Ok(reader)
     }
 
@@ -225,26 +228,34 @@ impl MultiReader {
         }
     }
 
-    /// One time axis for all inputs. Their frames begin together, their samples count for themselves.
-    fn align(&mut self) -> Result<(), IoError> {
-        let begins = self
-            .inputs
-            .iter()
-            .filter_map(|input| Some(input.notes.timestamps.beginning()? / input.grouped.per_frame() as u64));
-        self.origin = begins.min().unwrap_or(0);
-        let origin = self.origin;
-        for input in &mut self.inputs {
-            let per_frame = input.grouped.per_frame() as u64;
-            let breaks = input.notes.timestamps.breaks(origin.saturating_mul(per_frame));
-            let breaks = breaks.map_err(|problem| input.unfit(problem))?;
-            let frames = breaks.iter().map(|next| next.lost).fold(0, u64::saturating_add) / per_frame;
-            if frames > MOST_LOST {
-                return Err(input.unfit(format!(
-                    "{frames} frames were lost in all, more than {MOST_LOST}; check the numbers, or fuse the parts one by one"
-                )));
-            }
-            input.grouped.aligned.lose(breaks);
+    /// One time axis for all inputs.
+    fn align(&mut self, given: Option<&LostSamples>) -> Result<(), IoError> {
+        let max_lost = self.max_lost;
+        let channels: Vec<_> = self.headers().map(|(_, header)| header.channels).collect();
+        let lost = match given {
+            Some(given) => given.of_inputs(&channels)?,
+            None => vec![LostInInput::default(); channels.len()],
+        };
+        let mut inputs: Vec<_> = self.inputs.iter_mut().zip(lost).collect();
+        for (input, lost) in &mut inputs {
+            input.take_timestamps(lost)?;
         }
+        // The frames of all inputs begin together, their samples count for themselves.
+        let begins = inputs.iter().filter_map(|(input, lost)| {
+            Some(lost.timestamps.beginning()? / input.grouped.per_frame() as u64)
+        });
+        let origin = begins.min().unwrap_or(0);
+        for (input, lost) in inputs {
+            let per_frame = input.grouped.per_frame() as u64;
+            let breaks = lost.timestamps.breaks(origin.saturating_mul(per_frame));
+            let breaks = breaks.map_err(|problem| input.unfit(problem))?;
+            let frames = breaks.iter().map(|next| next.lost).fold(0, u64::saturating_add);
+            if frames / per_frame > max_lost {
+                return Err(input.unfit(too_many_lost(frames / per_frame, max_lost)));
+            }
+            input.grouped.aligned.lose(breaks, lost);
+        }
+        self.origin = origin;
         Ok(())
     }
 }

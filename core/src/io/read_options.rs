@@ -1,7 +1,8 @@
 //! Settings of the reading of several inputs.
 
 use super::table::TableOptions;
-use super::{Coding, StatedScale};
+use super::timestamps::MAX_LOST;
+use super::{Coding, LostSamples, StatedScale};
 use crate::runtime::Sample;
 
 /// Bytes of a block that suit one thread.
@@ -38,6 +39,11 @@ pub struct ReadOptions<'a> {
     /// Samples of each input in a row that are a frame, where converters sample more often than there are
     /// frames; empty for one of each.
     pub samples_per_frame: &'a [usize],
+    /// The lost samples, if a file lists them.
+    pub lost: Option<&'a LostSamples>,
+    /// Maximum number of lost frames of one input, by default [`MAX_LOST`]. Without a limit a wrong number
+    /// would lead to endless output.
+    pub max_lost: u64,
     /// Which input decides where the reading ends.
     pub until: Until,
     /// The most bytes of an input that are read at a time; less if there are many inputs.
@@ -45,7 +51,7 @@ pub struct ReadOptions<'a> {
 }
 
 impl ReadOptions<'_> {
-    /// Files with headers.
+    /// Files with headers, nothing lost.
     pub fn files() -> Self {
         Self {
             coding: Coding::Wav,
@@ -56,6 +62,8 @@ impl ReadOptions<'_> {
             table: TableOptions::default(),
             interleaving: None,
             samples_per_frame: &[],
+            lost: None,
+            max_lost: MAX_LOST,
             until: Until::Shortest,
             block_bytes: BLOCK_BYTES,
         }

@@ -351,7 +351,7 @@ mod tests {
             recording.timestamps("test").unwrap(),
             Timestamps::new(vec![timestamp(0, 100), timestamp(5, 107)]).unwrap()
         );
-        assert_eq!(meta("ri8", &[(0, None), (5, None)]).timestamps("test").unwrap(), Timestamps::default());
+        assert!(meta("ri8", &[(0, None), (5, None)]).timestamps("test").unwrap().is_empty());
     }
 
     #[test]

@@ -3,11 +3,11 @@
 use std::collections::VecDeque;
 
 /// Maximum number of frames lost at one break, 2^36 (a minute at a gigahertz).
-const MOST_LOST_AT_ONCE: u64 = 1 << 36;
+pub const MAX_LOST_AT_ONCE: u64 = 1 << 36;
 
-/// Maximum number of frames that an input leaves out, 2^26 (23 minutes at 48 kHz): without a limit a wrong
-/// number would lead to endless output.
-pub(super) const MOST_LOST: u64 = 1 << 26;
+/// Default maximum number of frames that an input leaves out, 2^26 (23 minutes at 48 kHz): without a limit a
+/// wrong number would lead to endless output.
+pub const MAX_LOST: u64 = 1 << 26;
 
 /// Frame `frame` of the input was number `index` at the converter, which counts lost frames too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,6 +70,11 @@ impl Timestamps {
         Ok(Self(self.0.into_iter().map(grouped).collect()))
     }
 
+    /// True if there are no timestamps.
+    pub(super) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// The first one.
     pub(super) fn first(&self) -> Option<Timestamp> {
         self.0.first().copied()
@@ -121,9 +126,9 @@ fn lost_between(a: Timestamp, b: Timestamp) -> Result<u64, String> {
             b.frame, b.index, a.frame, a.index
         )
     })?;
-    if lost > MOST_LOST_AT_ONCE {
+    if lost > MAX_LOST_AT_ONCE {
         return Err(format!(
-            "{lost} samples are lost before sample_start {}; more than {MOST_LOST_AT_ONCE} at once are taken for a mistake, fuse the parts one by one",
+            "{lost} samples are lost before sample_start {}; more than {MAX_LOST_AT_ONCE} at once are taken for a mistake, fuse the parts one by one",
             b.frame
         ));
     }
@@ -180,7 +185,7 @@ mod tests {
             (&[(4, 4), (2, 9)], "must not overlap"),
             (&[(4, 3)], "before 0"),
             (&[(4, 5), (4, 6)], "sample_start 4 has two numbers"),
-            (&[(0, 0), (1, MOST_LOST_AT_ONCE + 2)], "mistake"),
+            (&[(0, 0), (1, MAX_LOST_AT_ONCE + 2)], "mistake"),
             (&[(0, 0), (1, u64::MAX)], "mistake"),
         ] {
             let fault = timestamps(pairs).unwrap_err();

@@ -1,6 +1,7 @@
 use super::*;
 use crate::io::block::NumberFrames;
 use crate::io::{PcmFormat, SampleLayout};
+use crate::random::Random;
 use crate::runtime::PcmFrames;
 
 /// A block of as many frames as the bytes hold.
@@ -12,10 +13,15 @@ fn block(header: &StreamHeader, bytes: &[u8]) -> Block {
 }
 
 /// Frames of big-endian 16-bit samples 0, 1, 2, ..
-fn input(channels: usize, breaks: &[(u64, u64)]) -> AlignedInput {
+fn input(channels: usize, breaks: &[(u64, u64)], dropouts: &[(usize, std::ops::Range<u64>)]) -> AlignedInput {
     let layout = SampleLayout::packed(PcmFormat::S16Be);
     let mut input = AlignedInput::new(StreamHeader::real(layout, channels));
-    input.lose(breaks.iter().map(|&(frame, lost)| Break { frame, lost }).collect());
+    let dropout = |(channel, frames): &(usize, std::ops::Range<u64>)| Dropout {
+        channel: Some(*channel),
+        frames: frames.clone(),
+    };
+    let lost = LostInInput { dropouts: dropouts.iter().map(dropout).collect(), ..LostInInput::default() };
+    input.lose(breaks.iter().map(|&(frame, lost)| Break { frame, lost }).collect(), lost);
     input
 }
 
@@ -45,21 +51,23 @@ fn run(mut input: AlignedInput, frames: usize, block: usize, step: usize) -> Vec
 }
 
 #[test]
-fn lost_frames_come_out_as_nan_however_they_are_cut() {
+fn lost_frames_and_invalid_samples_come_out_as_nan_however_they_are_cut() {
     let breaks = [(0, 2), (3, 2893)];
+    // Frames 2, 3, 4 of time are frames 0, 1, 2 of the input; 2898 is its frame 3.
+    let dropouts = [(1, 0..3), (0, 4..2899), (1, 2898..2900), (1, 2899..2901)];
     let mut want = vec![None; 4];
-    want.extend((0..6).map(Some));
+    want.extend([Some(0), None, Some(2), Some(3), None, Some(5)]);
     want.extend(vec![None; 2 * 2893]);
-    want.extend((6..14).map(Some));
+    want.extend([None, None, Some(8), None, Some(10), None, Some(12), Some(13)]);
     for (block, step) in [(1, 1), (2, 3), (5, 1000), (7, usize::MAX)] {
-        assert_eq!(run(input(2, &breaks), 7, block, step), want, "{block} {step}");
+        assert_eq!(run(input(2, &breaks, &dropouts), 7, block, step), want, "{block} {step}");
     }
 }
 
 #[test]
 fn an_input_that_ends_early_leaves_later_timestamps_unreached() {
-    let mut short = input(1, &[(9, 4)]);
-    assert_eq!(run(input(1, &[(3, 1)]), 3, 2, 9), [Some(0), Some(1), Some(2), None]);
+    let mut short = input(1, &[(9, 4)], &[]);
+    assert_eq!(run(input(1, &[(3, 1)], &[]), 3, 2, 9), [Some(0), Some(1), Some(2), None]);
     let two = block(&short.header, &[0; 4]);
     let _ = short.refill(two);
     short.end();
@@ -71,4 +79,46 @@ fn an_input_that_ends_early_leaves_later_timestamps_unreached() {
     assert_eq!(short.view(5, 1).frames(), 5);
     short.advance(5);
     assert!(short.is_over() && short.seen() == 2);
+}
+
+#[test]
+fn covered_is_what_some_dropout_contains() {
+    let mut dice = Random(18);
+    for trial in 0..500 {
+        let channels = dice.count(1, 4);
+        let mut list: Vec<Dropout> = (0..dice.below(30))
+            .map(|_| {
+                let first = dice.below(100) as u64;
+                let channel = dice.below(channels + 1);
+                let frames = first..first + dice.count(1, 40) as u64;
+                Dropout { channel: (channel < channels).then_some(channel), frames }
+            })
+            .collect();
+        list.sort_by_key(|dropout| dropout.frames.start);
+        let mut dropouts = Dropouts::new(list.clone(), channels);
+        let mut time = 0;
+        while time < 200 {
+            let step = dropouts.until_change().min(dice.count(1, 10) as u64);
+            for frame in time..time + step {
+                for c in 0..channels {
+                    let contains = |dropout: &Dropout| {
+                        dropout.channel.is_none_or(|channel| channel == c) && dropout.frames.contains(&frame)
+                    };
+                    let wanted = list.iter().any(contains);
+                    assert_eq!(dropouts.covers(c), wanted, "trial {trial}, frame {frame}, channel {c}");
+                }
+            }
+            dropouts.advance(step);
+            time += step;
+        }
+    }
+}
+
+#[test]
+fn overlapping_dropouts_take_one_step() {
+    let overlapping = (0..100_000).map(|k| Dropout { channel: None, frames: k..k + 100_000 });
+    let mut dropouts = Dropouts::new(overlapping.collect(), 2);
+    assert_eq!(dropouts.until_change(), 199_999);
+    dropouts.advance(199_999);
+    assert!(!dropouts.any() && dropouts.until_change() == u64::MAX);
 }

@@ -31,7 +31,7 @@ fn reader(
     let input = Input::on_thread_of("dying".into(), header, 1, send_all).unwrap();
     let (stop, until) = (crossbeam_channel::never(), Until::Shortest);
     let inputs = vec![input];
-    MultiReader { inputs, stop, until, origin: 0, ready: 0, consumed: 0 }
+    MultiReader { inputs, stop, until, max_lost: 0, origin: 0, ready: 0, consumed: 0 }
 }
 
 #[test]
@@ -95,20 +95,20 @@ fn time_interleaved_converters_are_the_channels_of_one_input() {
 }
 
 #[test]
-fn more_lost_samples_than_can_be_meant_are_refused_with_the_bound() {
+fn more_lost_samples_than_allowed_are_refused_with_the_bound() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.sigmf-meta");
-    std::fs::write(path.with_extension("sigmf-data"), [0; 8]).unwrap();
-    let start = |lost: u64| {
-        let capture = |frame: u64, index: u64| {
-            format!(r#"{{"core:sample_start": {frame}, "core:global_index": {index}}}"#)
-        };
-        let captures = [capture(0, 0), capture(1, 41), capture(2, 2 + lost)].join(", ");
-        let meta = format!(r#"{{"global": {{"core:datatype": "ri8"}}, "captures": [{captures}]}}"#);
-        std::fs::write(&path, meta).unwrap();
-        MultiReader::start(std::slice::from_ref(&path), ReadOptions::files(), &mut |_| {})
+    let path = folder.path().join("a.raw");
+    std::fs::write(&path, [0; 8]).unwrap();
+    let lines = r#"{"sample_start": 0, "global_index": 0}
+        {"sample_start": 1, "global_index": 41}
+        {"sample_start": 2, "global_index": 82}"#;
+    let lost = LostSamples::parse(lines, "lost").unwrap();
+    let start = |max_lost| {
+        let options = ReadOptions { lost: Some(&lost), max_lost, ..raw(1) };
+        MultiReader::start(std::slice::from_ref(&path), options, &mut |_| {})
     };
-    assert!(start(MOST_LOST).is_ok());
-    let error = start(MOST_LOST + 1).err().unwrap().to_string();
-    assert!(error.contains("67108865 frames were lost in all, more than 67108864"), "{error}");
+    assert!(start(80).is_ok());
+    let error = start(79).err().unwrap().to_string();
+    assert!(error.contains("80 frames were lost in all, more than 79"), "{error}");
+    assert!(error.contains("allow 80"), "{error}");
 }
