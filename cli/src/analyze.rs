@@ -12,7 +12,6 @@ use hybank::overview::{decibels, frequency, key_figures, six_digits, understood}
 use hybank::quantity::{self, WrittenTime, readable};
 use hybank::spec::{ErrorBox, ErrorPoint};
 use hybank::units::Seconds;
-use hybank::verify::Verified;
 use std::path::PathBuf;
 
 /// Computes the gamma of a bank, with the delays of its spec or with others
@@ -31,7 +30,6 @@ use std::path::PathBuf;
 Examples:
   hybank analyze bank.json
   hybank analyze bank.json --delay-error 1e-7,-1e-7
-  hybank analyze bank.json --certify
   hybank analyze bank.json --delay-box 10ps
   hybank analyze bank.json --delay-box 2us --gain-box 0.5% --reference none
   hybank analyze bank.json --json | jq .gamma")]
@@ -41,9 +39,6 @@ pub(super) struct Args {
     /// True delay minus the delay in the bank, one value per channel: 10ps, 1e-11 or "0.01 samples"
     #[arg(long, value_name = "TIMES", value_delimiter = ',', value_parser = quantity::time)]
     delay_error: Vec<WrittenTime>,
-    /// Also prove an upper bound of gamma (bounded-real lemma, with every rounding error bounded)
-    #[arg(long)]
-    certify: bool,
     #[command(flatten)]
     errors: BoxArgs,
     /// Print the result as one JSON object
@@ -88,14 +83,12 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let delay_errors: Vec<Seconds> =
         args.delay_error.iter().map(|error| error.in_seconds(bank.fast_period)).collect();
     let analysis = design::analyze(&bank, &delay_errors).in_file(&args.bank)?;
-    let certified = args.certify.then(|| design::certify(&bank)).transpose().in_file(&args.bank)?;
     let worst_case = errors.map(|errors| BoxStudy::new(&bank, &errors)).transpose().in_file(&args.bank)?;
     let report = AnalysisReport {
         understood: bank.spec.as_ref().map(understood).unwrap_or_default(),
         is_normalised: bank.is_normalised(),
         scale: GammaScale::new(&bank, &delay_errors).in_file(&args.bank)?,
         analysis,
-        certified,
         figures: Figures::new(&bank).in_file(&args.bank)?,
         with_errors: with_errors(&bank, &delay_errors).in_file(&args.bank)?,
         worst_case,
@@ -112,16 +105,11 @@ fn with_errors(bank: &Bank, delay_errors: &[Seconds]) -> Result<Option<KeyFigure
 impl Args {
     /// Refuses flags that do not go together.
     fn check(&self) -> Result<(), Failure> {
-        let usage = |message: &str| Err(Failure::Usage(message.to_owned()));
-        match self.delay_error.is_empty() {
-            false if self.certify => {
-                usage("--certify proves the bank with its own delays; leave out --delay-error")
-            }
-            false if self.errors.widths().has_box() => {
-                usage("a box of errors lies around the delays of the bank; leave out --delay-error")
-            }
-            _ => Ok(()),
+        if self.delay_error.is_empty() || !self.errors.widths().has_box() {
+            return Ok(());
         }
+        let message = "a box of errors lies around the delays of the bank; leave out --delay-error";
+        Err(Failure::Usage(message.to_owned()))
     }
 }
 
@@ -134,8 +122,6 @@ struct AnalysisReport {
     scale: GammaScale,
     #[serde(flatten)]
     analysis: Analysis,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    certified: Option<Verified>,
     /// With the delays of the bank.
     figures: Figures,
     /// With the delays that are given.
@@ -148,14 +134,6 @@ struct AnalysisReport {
 impl AnalysisReport {
     fn text(&self) -> String {
         let Analysis { gamma, peak_hertz, noncausal, mean } = self.analysis;
-        let proof = self.certified.map_or_else(String::new, |proof| {
-            format!(
-                "certified    {}   proven upper bound (P of order {}; at least {} is proven as well)\n",
-                number(proof.upper),
-                proof.states,
-                number(proof.attained)
-            )
-        });
         let noncausal = noncausal.map_or_else(
             || "unknown       delays of like channels lie closer together than doubles resolve".to_owned(),
             |bound| format!("{}   computed lower bound for any bank", number(bound)),
@@ -164,7 +142,7 @@ impl AnalysisReport {
         format!(
             "{}\n{}{}\
              gamma        {}   worst-case gain from the signal's source w to the error (h = 1)\n\
-             scale        {}, {}\n{proof}\
+             scale        {}, {}\n\
              worst at     {} modulo the slow rate\n\
              noncausal    {noncausal}\n\
              rms error    {}   for white noise of unit density at the analog input\n\

@@ -54,17 +54,6 @@ impl CaptureArgs {
         check_channels(self.channels, self.format)
     }
 
-    /// What was given, as it is typed.
-    pub(super) fn typed(&self) -> String {
-        let format = (self.format != Coding::Wav).then(|| format!(" --format {}", self.format));
-        let channels = self.channels.map(|channels| format!(" --channels {channels}"));
-        let scale = self.scale.full_scale.map(|scale| format!(" --full-scale {scale}"));
-        let channel = self.channel.map(|channel| format!(" --channel {channel}"));
-        let iq = self.iq.then(|| " --iq".to_owned());
-        let table = Some(self.table.typed());
-        [format, channels, iq, scale, channel, table].into_iter().flatten().collect()
-    }
-
     /// For a recording that the one called `file` is compared with: what the options say of the format holds
     /// for both, unless its name says that it is WAV.
     pub(super) fn of_reference(&self, file: &Path, reference: &Path) -> ReadOptions<'static> {
@@ -126,11 +115,6 @@ impl InterleavedArgs {
     /// True if converters take turns.
     pub(super) fn is_given(self) -> bool {
         self.interleaved.is_some()
-    }
-
-    /// What was given, as it is typed.
-    pub(super) fn typed(self) -> String {
-        self.interleaved.map_or_else(String::new, |converters| format!(" --interleaved {converters}"))
     }
 
     /// Refuses more than one input, before any file is read.

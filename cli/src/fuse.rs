@@ -4,8 +4,9 @@ use super::bank_file;
 use super::before_after::{self, BeforeAfterArgs};
 use super::bit_true::BitTrueArgs;
 use super::capture_args::CaptureArgs;
+use super::choice::one_of;
 use super::observer::RunObserver;
-use super::output::{bits, container_of};
+use super::output::{WIDTHS, container_of};
 use super::print::{Failure, is_dash, print, print_report, say_understood};
 use super::run::{BankRun, Finished, RunArgs, RunReport};
 use super::tracked::{self, InstantArgs};
@@ -45,7 +46,7 @@ pub(super) struct Args {
     #[arg(short, long)]
     output: PathBuf,
     /// Sample format of the output: integers of 16, 24 or 32 bits, floats of 32 or 64 bits
-    #[arg(long, value_parser = bits(), default_value = "32f")]
+    #[arg(long, value_parser = one_of(WIDTHS), default_value = "32f")]
     bits: PcmFormat,
     /// Keep the bank's latency: the causal output, as `stream` gives it
     #[arg(long, conflicts_with = "track")]

@@ -3,7 +3,8 @@
 use super::calibrate_report::{Interval, interval, shown};
 use super::capture_args::{CaptureArgs, check_stdin};
 use super::capture_file::{start, unread};
-use super::output::bits;
+use super::choice::one_of;
+use super::output::WIDTHS;
 use super::print::{Failure, check_json, failed, failed_at, is_dash, name, show, warn};
 use super::written::{Mono, begin_recording, check_output, write_text};
 use hybank::captures::Captures;
@@ -56,7 +57,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "TIME", value_parser = quantity::time, hide_short_help = true)]
     within: Option<WrittenTime>,
     /// Samples of the WAV file: integers, or floats
-    #[arg(long, value_parser = bits(), default_value = "32f")]
+    #[arg(long, value_parser = one_of(WIDTHS), default_value = "32f")]
     bits: PcmFormat,
     #[command(flatten)]
     reading: CaptureArgs,

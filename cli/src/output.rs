@@ -1,7 +1,7 @@
 //! The format of output samples, and the files that a run writes.
 
+use super::choice::Choice;
 use super::print::{Failure, failed, is_dash, warn};
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hybank::files::refuse_overlaps;
 use hybank::io::{
     Container, IoError, OutputHeader, PcmFormat, SampleWriter, is_pipe, is_sigmf, mat_variable, sigmf_files,
@@ -9,22 +9,14 @@ use hybank::io::{
 use hybank::messages::Quoted;
 use std::path::Path;
 
-/// Sample formats of a WAV output, by their names on the command line.
-const WIDTHS: [(&str, PcmFormat, &str); 5] = [
-    ("16", PcmFormat::S16Le, "16-bit integers"),
-    ("24", PcmFormat::S24Le, "24-bit integers"),
-    ("32", PcmFormat::S32Le, "32-bit integers"),
-    ("32f", PcmFormat::F32Le, "32-bit floats"),
-    ("64f", PcmFormat::F64Le, "64-bit floats"),
+/// What `--bits` takes: sample formats of a WAV output.
+pub(super) const WIDTHS: &[Choice<PcmFormat>] = &[
+    Choice { name: "16", help: "16-bit integers", value: PcmFormat::S16Le },
+    Choice { name: "24", help: "24-bit integers", value: PcmFormat::S24Le },
+    Choice { name: "32", help: "32-bit integers", value: PcmFormat::S32Le },
+    Choice { name: "32f", help: "32-bit floats", value: PcmFormat::F32Le },
+    Choice { name: "64f", help: "64-bit floats", value: PcmFormat::F64Le },
 ];
-
-/// Reads `--bits`.
-pub(super) fn bits() -> impl TypedValueParser<Value = PcmFormat> {
-    let names = WIDTHS.map(|(name, _, help)| PossibleValue::new(name).help(help));
-    PossibleValuesParser::new(names).try_map(|given| {
-        WIDTHS.iter().find(|(name, ..)| *name == given).map(|(_, format, _)| *format).ok_or("unknown name")
-    })
-}
 
 /// Begins an output of samples, and says what its header cannot.
 pub(super) fn begin_samples(path: &Path, header: OutputHeader, force: bool) -> Result<SampleWriter, IoError> {
@@ -33,12 +25,13 @@ pub(super) fn begin_samples(path: &Path, header: OutputHeader, force: bool) -> R
     Ok(writer)
 }
 
-/// Encoded formats, which are not written.
-const ENCODED: [&str; 10] = ["flac", "mp3", "ogg", "oga", "opus", "m4a", "aac", "aif", "aiff", "aifc"];
 /// Endings of WAV files.
 pub(super) const WAV: [&str; 4] = ["wav", "wave", "bwf", "rf64"];
-/// Formats with a structure, which are not written either.
-const STRUCTURED: [&str; 10] = ["npy", "npz", "mat", "csv", "txt", "json", "toml", "h5", "hdf5", "zip"];
+/// Endings of other formats, which are not written.
+const OTHERS: [&str; 20] = [
+    "flac", "mp3", "ogg", "oga", "opus", "m4a", "aac", "aif", "aiff", "aifc", "npy", "npz", "mat", "csv",
+    "txt", "json", "toml", "h5", "hdf5", "zip",
+];
 
 /// Whether the name of a file says that it is WAV; pipes have any name.
 pub(super) fn is_wav(output: &Path) -> bool {
@@ -58,22 +51,21 @@ fn check_extension(output: &Path, container: Container) -> Result<(), Failure> {
     let extension = extension.to_ascii_lowercase();
     let remedy = match (extension.as_str(), container) {
         _ if is_pipe(output) => return Ok(()),
-        ("sigmf-meta", _) | ("npy", Container::Npy) => return Ok(()),
+        ("sigmf-meta", _) | ("npy", Container::Npy) | ("", Container::Wav) => return Ok(()),
         ("sigmf" | "sigmf-data", _) => {
             format!("name it {}", Quoted(output.with_extension("sigmf-meta")))
         }
-        (encoded, _) if ENCODED.contains(&encoded) => {
-            format!("write it to a pipe: hybank fuse .. -o - | sox -t wav - {}", Quoted(output))
-        }
-        (other, Container::Wav) if other.is_empty() || WAV.contains(&other) || is_pipe(output) => {
-            return Ok(());
-        }
-        (_, Container::Wav) => {
-            let raw = "hybank stream BANK.json --input CH1.wav .. --output-format f32le";
-            format!("name it {}, or write raw samples: {raw}", Quoted(output.with_extension("wav")))
-        }
+        (wav, Container::Wav) if WAV.contains(&wav) => return Ok(()),
         (wav, Container::Raw) if WAV.contains(&wav) => "give --output-format wav".to_owned(),
-        (other, Container::Raw) if STRUCTURED.contains(&other) => {
+        (_, Container::Wav) => {
+            let name = output.with_extension("wav");
+            format!(
+                "name it {}, or pipe it to what converts it: -o - | sox -t wav - {}",
+                Quoted(name),
+                Quoted(output)
+            )
+        }
+        (other, Container::Raw) if OTHERS.contains(&other) => {
             format!("name it {}", Quoted(output.with_extension("raw")))
         }
         _ => return Ok(()),

@@ -72,22 +72,15 @@ fn of_page(path: &Path, error: PageError) -> Failure {
 }
 
 impl Args {
-    /// The command lines that lead to what the page shows.
+    /// The command lines that lead to what the page shows, the last one as it was typed.
     fn commands(&self) -> Vec<String> {
-        let bank = shell_word(&self.bank);
-        let inputs: String = self.inputs.iter().map(|path| format!(" {}", shell_word(path))).collect();
-        let inputs = inputs + &self.reading.typed() + &self.interleaved.typed();
-        let mut commands = vec![
+        let typed: Vec<String> =
+            std::env::args_os().skip(1).map(|word| shell_word(&word.to_string_lossy())).collect();
+        vec![
             "hybank design spec.toml -o bank.json  # the spec above, saved as spec.toml".to_owned(),
-            format!("hybank verify {bank}"),
-            format!("hybank analyze {bank} --delay-box 0.001samples"),
-            format!("hybank plot {bank} -o pictures"),
-        ];
-        if !self.inputs.is_empty() {
-            commands.push(format!("hybank fuse {bank}{inputs} -o fused.wav"));
-        }
-        commands.push(format!("hybank report {bank}{inputs} -o {}", shell_word(&self.output)));
-        commands
+            format!("hybank verify {}", shell_word(&self.bank.display().to_string())),
+            format!("hybank {}", typed.join(" ")),
+        ]
     }
 
     /// The captures, fused by `bank`.

@@ -1,13 +1,13 @@
 //! How `fuse` and `stream` run a bank: their common options, the run from its plan to its files, the report.
 
 use super::capture_args::{InterleavedArgs, check_stdin, output_rate};
+use super::choice::{Choice, one_of};
 use super::file_kind::unreadable;
 use super::gaps::{GapArgs, say_gaps};
 use super::interrupt::interrupts;
 use super::observer::{ObserverArgs, RunObserver};
 use super::output::{begin_samples, check_files};
 use super::print::{Failure, InFile, check_strict, failed, stopped, warn, with_remains};
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use hybank::bank::Bank;
 use hybank::captures::{Converters, FileFormat};
 use hybank::io::{
@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 pub(super) struct RunArgs {
     /// Algorithm of FIR filters; auto is the fastest for the bank, and direct with --gaps and in
     /// `stream`, because overlap-save adds latency (--json says how much)
-    #[arg(long, value_parser = algorithms(), default_value_t = Algorithm::Auto, hide_short_help = true)]
+    #[arg(long, value_parser = one_of(ALGORITHMS), default_value_t = Algorithm::Auto, hide_short_help = true)]
     algorithm: Algorithm,
     #[command(flatten)]
     pub(super) interleaved: InterleavedArgs,
@@ -48,18 +48,16 @@ pub(super) struct RunArgs {
     pub(super) json: bool,
 }
 
-/// Reads `--algorithm`.
-fn algorithms() -> impl TypedValueParser<Value = Algorithm> {
-    let names = Algorithm::ALL.map(|algorithm| {
-        PossibleValue::new(algorithm.name()).help(match algorithm {
-            Algorithm::Auto => "The fastest algorithm that suits the command",
-            Algorithm::Direct => "Computes every product; adds no latency",
-            Algorithm::OverlapSave => "Fourier transforms of blocks; faster for long filters, adds latency",
-            _ => "",
-        })
-    });
-    PossibleValuesParser::new(names).try_map(|name| name.parse())
-}
+/// What `--algorithm` takes.
+const ALGORITHMS: &[Choice<Algorithm>] = &[
+    Choice { name: "auto", help: "The fastest algorithm that suits the command", value: Algorithm::Auto },
+    Choice { name: "direct", help: "Computes every product; adds no latency", value: Algorithm::Direct },
+    Choice {
+        name: "overlap-save",
+        help: "Fourier transforms of blocks; faster for long filters, adds latency",
+        value: Algorithm::OverlapSave,
+    },
+];
 
 impl RunArgs {
     /// Threads beside the calling one, if it does not do all.

@@ -43,18 +43,4 @@ impl TableArgs {
             ..TableOptions::default()
         }
     }
-
-    /// What was given, as it is typed.
-    pub(super) fn typed(&self) -> String {
-        let quoted = |text: String| if text.contains(' ') { format!("\"{text}\"") } else { text };
-        let columns: Vec<String> = self.columns.iter().map(Column::to_string).collect();
-        let given = [
-            (self.skip_lines > 0).then(|| format!(" --skip-lines {}", self.skip_lines)),
-            (!columns.is_empty()).then(|| format!(" --columns {}", quoted(columns.join(",")))),
-            self.time_column.as_ref().map(|column| format!(" --time-column {}", quoted(column.to_string()))),
-            self.delimiter.map(|delimiter| format!(" --delimiter {delimiter}")),
-            self.decimal.map(|decimal| format!(" --decimal {decimal}")),
-        ];
-        given.into_iter().flatten().collect()
-    }
 }

@@ -74,16 +74,11 @@ impl Clock {
         on_line(&self.instants, &self.samples, instant.0)
     }
 
-    /// Fast periods from one sample to the next, around a sample.
-    fn period_at(&self, sample: f64) -> f64 {
-        let k = segment(&self.samples, sample);
-        (self.instants[k + 1] - self.instants[k]) / (self.samples[k + 1] - self.samples[k])
-    }
-
     /// The periods between knots, as far as `samples` reach.
     pub(super) fn periods(&self, samples: Range<f64>) -> impl Iterator<Item = f64> {
         let [first, last] = [samples.start, samples.end].map(|sample| segment(&self.samples, sample));
-        (first..=last).map(|k| self.period_at(self.samples[k]))
+        let rise = |values: &[f64], k: usize| values[k + 1] - values[k];
+        (first..=last).map(move |k| rise(&self.instants, k) / rise(&self.samples, k))
     }
 }
 

@@ -353,7 +353,6 @@ def analyze(
     bank: Bank | _Path,
     *,
     delay_error: _Values | None = None,
-    certify: bool = False,
     delay_box: _Values | None = None,
     gain_box: _Values | None = None,
     cutoff_box: _Values | None = None,

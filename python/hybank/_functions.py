@@ -62,9 +62,7 @@ def verify(bank, *, search=False):
 
 
 @checked
-def analyze(
-    bank, *, delay_error=None, certify=False, delay_box=None, gain_box=None, cutoff_box=None, reference=None
-):
+def analyze(bank, *, delay_error=None, delay_box=None, gain_box=None, cutoff_box=None, reference=None):
     """The error of a bank, with its own delays or with others, and its worst case over boxes of errors.
 
     Parameters
@@ -73,8 +71,6 @@ def analyze(
         A bank, or the path of its file.
     delay_error : float or str or list, optional
         True delays minus those of the bank: seconds or texts such as "10ps", one for all or one per channel.
-    certify : bool
-        Also prove an upper bound of gamma.
     delay_box, gain_box, cutoff_box : float or str or list, optional
         Bound the worst case over delays (seconds or "10ps"), gains and cut-offs (0.01 or "1%") that are off by up to
         this much, one value for all channels but the reference or one per channel.
@@ -91,7 +87,7 @@ def analyze(
     >>> found.gamma <= found.worst_case.attained <= found.worst_case.upper
     True
     """
-    return _hybank.analyze(bank, delay_error, certify, delay_box, gain_box, cutoff_box, reference)
+    return _hybank.analyze(bank, delay_error, delay_box, gain_box, cutoff_box, reference)
 
 
 @checked

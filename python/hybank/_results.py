@@ -304,10 +304,8 @@ class Analysis:
         The figures of the bank with its own delays.
     with_errors
         The signal-to-noise ratio and the largest image with the delays that are given; None without any.
-    certified
-        A proven upper bound of gamma; None unless asked for, as all below.
     worst_case
-        A proven bound of gamma over the box of errors, and the largest gamma found.
+        A proven bound of gamma over the box of errors, and the largest gamma found; None without a box.
     """
 
     gamma: float
@@ -319,7 +317,6 @@ class Analysis:
     scale: Record
     figures: Figures
     with_errors: Record | None = None
-    certified: Record | None = None
     worst_case: Record | None = None
 
     def __repr__(self):

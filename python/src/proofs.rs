@@ -12,7 +12,7 @@ use hybank::design::{self, DesignError};
 use hybank::figures::KeyFigures;
 use hybank::spec::ErrorBox;
 use hybank::units::Seconds;
-use hybank::verify::{self as checker, Verified};
+use hybank::verify as checker;
 use pyo3::prelude::*;
 use std::sync::Arc;
 
@@ -57,7 +57,6 @@ fn proven(bank: &bank::Bank, search: bool) -> Result<checker::Verified, String> 
 pub(crate) fn analyze<'py>(
     bank: &Bound<'py, PyAny>,
     delay_error: Option<&Bound<'py, PyAny>>,
-    certify: bool,
     delay_box: Option<&Bound<'py, PyAny>>,
     gain_box: Option<&Bound<'py, PyAny>>,
     cutoff_box: Option<&Bound<'py, PyAny>>,
@@ -75,13 +74,11 @@ pub(crate) fn analyze<'py>(
     let own = times("delay_error", delay_error)?;
     let own: Vec<Seconds> = own.iter().map(|error| error.in_seconds(given.bank.fast_period)).collect();
     let errors = widths.error_box(&given.bank).map_err(bad)?;
-    if (certify || errors.is_some()) && !own.is_empty() {
-        return Err(refused(
-            "delay_error: proofs and boxes are those of the bank's own delays; leave it out",
-        ));
+    if errors.is_some() && !own.is_empty() {
+        return Err(refused("delay_error: boxes lie around the bank's own delays; leave it out"));
     }
     let bank_in = Arc::clone(&given.bank);
-    let found = background::run(py, None, move |_| Studied::new(&bank_in, &own, certify, errors.as_ref()))?;
+    let found = background::run(py, None, move |_| Studied::new(&bank_in, &own, errors.as_ref()))?;
     of_report(py, "Analysis", &found.map_err(|error| refused_in(&given.name, error))?)
 }
 
@@ -102,7 +99,6 @@ struct Studied {
     scale: design::GammaScale,
     figures: FiguresReport,
     with_errors: Option<KeyFigures>,
-    certified: Option<Verified>,
     worst_case: Option<BoxStudy>,
 }
 
@@ -110,7 +106,6 @@ impl Studied {
     fn new(
         bank: &bank::Bank,
         delay_errors: &[Seconds],
-        certify: bool,
         errors: Option<&ErrorBox>,
     ) -> Result<Self, DesignError> {
         let point = design::delay_point(bank, delay_errors)?;
@@ -120,7 +115,6 @@ impl Studied {
             scale: design::GammaScale::new(bank, delay_errors)?,
             figures: FiguresReport::new(bank)?,
             with_errors: with_errors.transpose()?,
-            certified: certify.then(|| design::certify(bank)).transpose()?,
             worst_case: errors.map(|errors| BoxStudy::new(bank, errors)).transpose()?,
         })
     }

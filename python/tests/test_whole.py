@@ -97,14 +97,14 @@ def test_an_imaginary_part_is_the_other_half_of_a_complex_signal(bank):
 
 def test_worst_cases_over_boxes_are_those_of_the_command_line(folder, binary):
     flags = ["--delay-box", "0.02samples", "--gain-box", "0.2%"]
-    want = json.loads(run(binary, folder, "analyze", "bank.json", *flags, "--certify", "--json"))
-    found = hb.analyze(folder / "bank.json", delay_box="0.02samples", gain_box=0.002, certify=True)
+    want = json.loads(run(binary, folder, "analyze", "bank.json", *flags, "--json"))
+    found = hb.analyze(folder / "bank.json", delay_box="0.02samples", gain_box=0.002)
     as_json = lambda value: json.loads(json.dumps(value, default=lambda record: dict(record)))  # noqa: E731
-    for name in ("worst_case", "certified", "scale"):
+    for name in ("worst_case", "scale"):
         assert as_json(getattr(found, name)) == want[name], name
     assert found.gamma == want["gamma"] <= found.worst_case.attained <= found.worst_case.upper
     plain = hb.analyze(folder / "bank.json")
-    assert plain.worst_case is plain.certified is plain.with_errors is None
+    assert plain.worst_case is plain.with_errors is None
     moved = hb.analyze(folder / "bank.json", delay_error=["0samples", "0.02samples"])
     assert moved.with_errors.snr_db < plain.figures.snr.total_db
     own = hb.analyze(folder / "bank.json", delay_box=[0, "0.02samples"])

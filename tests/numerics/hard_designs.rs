@@ -3,7 +3,7 @@
 //! must not be larger; and no lower bound may exceed what any bank of the kind achieves.
 
 use crate::support::specs::{alike, low_pass};
-use hybank::design::{Design, DesignError, DesignOptions, analyze, certify};
+use hybank::design::{Design, DesignError, DesignOptions, analyze, prove};
 use hybank::spec::{DesignSpec, Family, Method, Spec};
 
 /// Designs without a search for proofs, which other tests are about.
@@ -147,7 +147,7 @@ fn the_interval_of_the_thesis_bank_is_proved_in_floating_point() {
     };
     for method in [Method::Fir, Method::Iir] {
         let bank = design(&case.spec(method)).unwrap().bank;
-        let proof = certify(&bank).unwrap();
+        let (_, proof) = prove(&bank).unwrap();
         let norm = bank.gamma.norm.unwrap();
         assert!(
             proof.attained <= proof.upper && proof.upper >= norm && proof.upper <= norm * (1.0 + 1e-5),

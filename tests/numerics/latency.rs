@@ -2,10 +2,9 @@
 //! error, of recursive ones the shortest whose whole error, that of the signal and the rounding to 16 bits,
 //! is within 0.1 dB of the best.
 
-use crate::support::specs::butterworth;
+use crate::support::specs::{alike, butterworth};
 use hybank::design::{DesignError, DesignOptions, Sizing, analyze_mean, design};
-use hybank::spec::{ChannelSpec, DesignSpec, Method, Spec};
-use hybank::units::Seconds;
+use hybank::spec::{DesignSpec, Method, Spec};
 use std::f64::consts::TAU;
 
 /// What "within 0.1 dB" means, and how exactly errors are compared.
@@ -71,10 +70,8 @@ fn fault(spec: &Spec, errors: &[f64], chosen: usize) -> Option<String> {
 #[test]
 fn comparison_methods_take_the_middle_of_their_taps() {
     for method in [Method::Sinc, Method::Separation] {
-        let filter = butterworth(6, TAU * 9.0 / 48.0);
-        let channels = [1.2, 0.3].map(|delay| ChannelSpec::new(Seconds(delay), filter.clone())).to_vec();
-        let design = DesignSpec::new(method, Some(15));
-        let spec = Spec { ratio: 2, target: filter, channels, design, ..four_at_48_khz(15) };
+        let spec = alike(&butterworth(6, TAU * 9.0 / 48.0), 2, 0, &[1.2, 0.3]);
+        let spec = Spec { latency: None, design: DesignSpec::new(method, Some(15)), ..spec };
         let (errors, chosen) = (errors(&spec), latency(&spec).unwrap());
         let best = errors.iter().copied().fold(f64::INFINITY, f64::min);
         assert!(errors[chosen] < 1.5 * best, "{}: {chosen} of {errors:?}", method.name());
@@ -83,21 +80,8 @@ fn comparison_methods_take_the_middle_of_their_taps() {
 
 /// 48 kHz from four 12 kHz converters.
 fn four_at_48_khz(taps: usize) -> Spec {
-    let filter = butterworth(6, TAU * 9.0 / 48.0);
-    let channel = |&delay: &f64| ChannelSpec::new(Seconds(delay), filter.clone());
-    Spec {
-        full_scale: None,
-        fit: Vec::new(),
-        name: String::new(),
-        fast_period: Seconds(1.0),
-        ratio: 4,
-        latency: None,
-        target: filter.clone(),
-        channels: [3.1, 1.9, 1.05, 0.0].iter().map(channel).collect(),
-        signal: None,
-        uncertainty: None,
-        design: DesignSpec::new(Method::Fir, Some(taps)),
-    }
+    let spec = alike(&butterworth(6, TAU * 9.0 / 48.0), 4, 0, &[3.1, 1.9, 1.05, 0.0]);
+    Spec { latency: None, design: DesignSpec::new(Method::Fir, Some(taps)), ..spec }
 }
 
 /// Half of the taps was the rule once: gamma 0.111 with 8 taps.
@@ -159,21 +143,8 @@ fn a_latency_that_the_taps_do_not_reach_is_refused() {
 #[test]
 fn a_common_delay_adds_to_the_latency() {
     let with_delay = |method: Method, common: f64| {
-        let filter = butterworth(2, 0.6);
-        let channel = |delay: f64| ChannelSpec::new(Seconds(common + delay), filter.clone());
-        Spec {
-            full_scale: None,
-            fit: Vec::new(),
-            name: String::new(),
-            fast_period: Seconds(1.0),
-            ratio: 2,
-            latency: None,
-            target: filter.clone(),
-            channels: vec![channel(1.25), channel(0.5)],
-            signal: None,
-            uncertainty: None,
-            design: DesignSpec::new(method, method.has_taps().then_some(14)),
-        }
+        let spec = alike(&butterworth(2, 0.6), 2, 0, &[common + 1.25, common + 0.5]);
+        Spec { latency: None, design: DesignSpec::new(method, method.has_taps().then_some(14)), ..spec }
     };
     for method in [Method::Fir, Method::Iir, Method::H2, Method::Sinc, Method::Separation] {
         let designed =

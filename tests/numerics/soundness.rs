@@ -4,7 +4,7 @@
 use crate::support::random::Random;
 use crate::support::specs::{alike, tf, thesis, with_taps};
 use hybank::bank::{Bank, Gamma, SynthesisFilters};
-use hybank::design::{DesignOptions, certify, design};
+use hybank::design::{DesignOptions, design, prove};
 use hybank::spec::{DesignSpec, Method, Spec};
 use hybank::units::Seconds;
 use hybank::verify::verify;
@@ -71,7 +71,7 @@ fn delays_next_to_whole_numbers_are_not_rounded() {
     ] {
         let example = OnePole { pole, latency, delay, fast_period: 1.0 };
         assert!((example.norm() / norm - 1.0).abs() < 1e-2, "{delay}: {}", example.norm());
-        let proven = certify(&example.bank()).unwrap();
+        let (_, proven) = prove(&example.bank()).unwrap();
         assert!(proven.attained <= example.norm() * (1.0 + 1e-9), "{delay}: {proven:?}");
         assert!(proven.upper >= example.norm() * (1.0 - 1e-9), "{delay}: {proven:?}");
         assert!(proven.upper <= example.norm() * (1.0 + 1e-6), "{delay}: {proven:?}");
@@ -99,8 +99,8 @@ fn no_interval_excludes_the_true_norm_for_any_delay() {
             format!("pole {pole:e}, latency {latency}, delay {delay:e}, h {fast_period:e}")
         };
         let (norm, scale) = (example.norm(), example.pole.sqrt());
-        match certify(&example.bank()) {
-            Ok(found) => {
+        match prove(&example.bank()) {
+            Ok((_, found)) => {
                 proven += 1;
                 // The oracle computes in doubles; below 1e-9 of the scale it is rounding itself.
                 let slack = 1e-7 * norm + 1e-9 * scale;

@@ -3,7 +3,7 @@
 
 use crate::support::specs::{alike, tf};
 use hybank::bank::{Bank, SynthesisFilters};
-use hybank::design::{DesignOptions, ProofSearch, certify, design, judge_taps};
+use hybank::design::{DesignOptions, ProofSearch, design, judge_taps, prove};
 use hybank::spec::{Family, FilterSpec, Method, Passband, Spec};
 use hybank::units::Hertz;
 
@@ -95,7 +95,7 @@ fn with_tap(spec: &Spec, tap: f64) -> Bank {
 
 /// The proven interval of the bank's norm holds `norm`, and is narrow.
 fn has_norm(bank: &Bank, norm: f64) {
-    let proven = certify(bank).unwrap();
+    let (_, proven) = prove(bank).unwrap();
     assert!(proven.attained <= norm * (1.0 + 1e-10), "attained {:e} > {norm:e}", proven.attained);
     assert!(proven.upper >= norm * (1.0 - 1e-10), "upper {:e} < {norm:e}", proven.upper);
     assert!(proven.upper - proven.attained <= 1e-5 * norm, "{proven:?}");

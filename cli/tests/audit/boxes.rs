@@ -6,8 +6,8 @@ use super::optimum::optimum;
 use super::plant::{Errors, Library, Plant};
 use super::plants::family;
 use super::statements::{Outcome, Tally, at, campaign, designed, judged, verified};
-use crate::support::Desk;
 use crate::support::random::Random;
+use crate::support::{Desk, words};
 use serde_json::{Value, json};
 use std::f64::consts::{PI, TAU};
 
@@ -174,20 +174,9 @@ fn boxed(seed: u64) -> Tally {
     };
     let half = half_widths(&mut dice, spec["channel"].as_array().map_or(1, Vec::len));
     let [delay, gain, cutoff] = [&half.delays, &half.gains, &half.cutoffs].map(|list| list[0].to_string());
-    let args = [
-        "analyze",
-        "bank.json",
-        "--json",
-        "--reference",
-        "none",
-        "--delay-box",
-        &format!("{delay}samples"),
-        "--gain-box",
-        &gain,
-        "--cutoff-box",
-        &cutoff,
-    ];
-    let output = desk.run(&args, &[]);
+    let boxes = format!("--delay-box {delay}samples --gain-box {gain} --cutoff-box {cutoff}");
+    let analyze = format!("analyze bank.json --json --reference none {boxes}");
+    let output = desk.run(&words(&analyze), &[]);
     let Ok(report) = serde_json::from_slice::<Value>(&output.stdout) else {
         tally.refused.push(format!("{name}, {half:?}: {}", String::from_utf8_lossy(&output.stderr)));
         return tally;

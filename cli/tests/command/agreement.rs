@@ -1,6 +1,6 @@
 //! `fuse` says whether the captures agree with the bank.
 
-use crate::support::Desk;
+use crate::support::{Desk, words};
 
 /// Two converters of 24 kHz, as in README.
 const SPEC: &str = "fast_rate = \"48 kS/s\"\nratio = 2\nlatency = 12\n[target]\n\
@@ -11,19 +11,9 @@ const SPEC: &str = "fast_rate = \"48 kS/s\"\nratio = 2\nlatency = 12\n[target]\n
 fn desk(length: &str) -> Desk {
     let desk = Desk::with_spec(SPEC);
     desk.good(&["design", "spec.toml", "-o", "bank.json"]);
-    let chirp = format!("chirp:50Hz..8kHz@{length}");
-    desk.good(&[
-        "simulate",
-        "spec.toml",
-        "--source",
-        &chirp,
-        "-o",
-        "cap",
-        "--noise",
-        "1e-3",
-        "--gain",
-        "0.5",
-    ]);
+    let simulate =
+        format!("simulate spec.toml --source chirp:50Hz..8kHz@{length} -o cap --noise 1e-3 --gain 0.5");
+    desk.good(&words(&simulate));
     desk
 }
 

@@ -1,7 +1,7 @@
 //! `calibrate`: captures of virtual converters to a spec, to a bank, to a fused recording without spurs.
 
 use crate::support::random::Random;
-use crate::support::{Desk, number, text, wav};
+use crate::support::{Desk, number, text, wav, words};
 use hybank::analog::StrictlyProper;
 use hybank::design::DesignOptions;
 use hybank::spec::Spec;
@@ -152,18 +152,8 @@ fn held_out_captures_and_one_file_of_all_converters_are_checked() {
         let turns: Vec<f32> = (0..4 * 8192).map(|n| channels[n % 4][n / 4]).collect();
         wav::write(&desk, name, 1, 1_000_000_000, &turns);
     }
-    let report = desk.json(&[
-        "calibrate",
-        "spec.toml",
-        "one.wav",
-        "--interleaved",
-        "4",
-        "-o",
-        "m.toml",
-        "--json",
-        "--check",
-        "two.wav",
-    ]);
+    let calibrate = "calibrate spec.toml one.wav --interleaved 4 -o m.toml --json --check two.wav";
+    let report = desk.json(&words(calibrate));
     assert_eq!(
         (&report["check"]["agrees"], &report["tones"][0]["zone"]),
         (&Value::Bool(true), &Value::from(2))

@@ -121,11 +121,13 @@ fn recordings_that_begin_at_other_times_are_refused() {
 }
 
 #[test]
-fn aiff_is_refused_for_the_true_reason() {
+fn recordings_that_are_not_decoded_are_refused_with_a_way_out() {
     let desk = desk();
-    desk.write("x.aiff", "FORM");
-    let parts = ["AIFF is not read", "ffmpeg -i"];
-    desk.refused(1, &["fuse", "turns.json", "x.aiff", "--interleaved", "2", "-o", "y.wav"], &parts);
+    for name in ["x.aiff", "x.mp3", "x.sigmf"] {
+        desk.write(name, "FORM");
+        let parts = [name, "not decoded here", "ffmpeg -i"];
+        desk.refused(1, &["fuse", "turns.json", name, "--interleaved", "2", "-o", "y.wav"], &parts);
+    }
 }
 
 /// Stamps of an uneven clock are used where that is asked for; each converter has its own.

@@ -1,6 +1,6 @@
 //! Samples that were lost: what tells of them, what stands in for them, what they touch. As a user runs it.
 
-use crate::support::{Desk, bytes, channel, floats, frames, fused, wav};
+use crate::support::{Desk, bytes, channel, floats, frames, fused, wav, words};
 use serde_json::{Value, json};
 use trials::random::Random;
 
@@ -283,18 +283,8 @@ fn follow_levels(desk: &Desk, steady: &[f32]) {
 fn a_table_of_delays_is_followed() {
     let desk = two_converters("10us");
     let tones = "tones:440Hz,3.1kHz,7.3kHz,11.9kHz,16.1kHz";
-    desk.good(&[
-        "simulate",
-        "bank.json",
-        "--source",
-        tones,
-        "--samples",
-        "96000",
-        "--drift",
-        "0,5",
-        "-o",
-        "cap",
-    ]);
+    let simulate = format!("simulate bank.json --source {tones} --samples 96000 --drift 0,5 -o cap");
+    desk.good(&words(&simulate));
     desk.write("delays.csv", "time,a,b\n0,0,1e-5\n2,0,2e-5\n");
     desk.write(
         "drift.jsonl",
@@ -348,18 +338,7 @@ fn a_table_of_delays_is_followed() {
     // Integers cannot hold what is beyond full scale.
     let loud: Vec<f32> = wav::samples(&desk, "cap/ch1.wav").iter().map(|x| 9.0 * x).collect();
     wav::write(&desk, "loud.wav", 1, 24_000, &loud);
-    let args = [
-        "fuse",
-        "bank.json",
-        "loud.wav",
-        "loud.wav",
-        "-o",
-        "loud16.wav",
-        "--bits",
-        "16",
-        "--track",
-        "delays.csv",
-    ];
+    let args = words("fuse bank.json loud.wav loud.wav -o loud16.wav --bits 16 --track delays.csv");
     let warnings = desk.report(&args)["warnings"].to_string();
     assert!(warnings.contains("clipped") && warnings.contains("--bits 32f"), "{warnings}");
     desk.refused(1, &[&args[..], &["--strict", "--force"]].concat(), &["clipped", "--strict"]);

@@ -1,4 +1,4 @@
-//! The command `measure`, and `fuse --measure`.
+//! The command `measure`.
 
 use crate::support::random::Random;
 use crate::support::{Desk, THESIS, number, text, wav};

@@ -59,7 +59,7 @@ fn captures_are_shown_before_and_after() {
     desk.good(&["simulate", "b.json", "--source", "tones:0.3", "--samples", "4000", "-o", "cap"]);
     let page = page(&desk, &["cap/ch1.wav", "cap/ch2.wav"]);
     assert_eq!(page.matches("<svg").count(), 10);
-    for part in ["Captures", "plain interleaving", "fused", "hybank fuse b.json cap/ch1.wav cap/ch2.wav"] {
+    for part in ["Captures", "plain interleaving", "fused", "--force cap/ch1.wav cap/ch2.wav"] {
         assert!(page.contains(part), "{part}");
     }
     // The figures and the spurs of the tone, before and after.

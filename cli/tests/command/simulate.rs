@@ -1,6 +1,6 @@
 //! The commands `simulate` and `demo`: virtual captures, fused again and compared with the target.
 
-use crate::support::{Desk, THESIS, number, wav};
+use crate::support::{Desk, THESIS, number, wav, words};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -27,18 +27,8 @@ fn every_source_is_captured_and_fused() {
     // Worst-case gain 0.04 for white spectra; these live where the bank is much better.
     for (source, least) in [("step@20.3", 55.0), ("tones:0.3,0.8", 45.0), ("chirp:0.01Hz..0.05Hz@300s", 50.0)]
     {
-        let captured = desk.json(&[
-            "simulate",
-            "bank.json",
-            "--source",
-            source,
-            "-o",
-            "cap",
-            "--force",
-            "--json",
-            "--samples",
-            "400",
-        ]);
+        let simulate = format!("simulate bank.json --source {source} -o cap --force --json --samples 400");
+        let captured = desk.json(&words(&simulate));
         assert_eq!((&captured["frames"], &captured["latency"]), (&Value::from(200), &Value::from(10)));
         assert_eq!(captured["files"].as_array().unwrap().len(), 3);
         desk.good(&["fuse", "bank.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "y.wav", "--force"]);

@@ -20,7 +20,8 @@ fn wrong_usage_is_exit_code_two() {
         &["b.json", "1 delay errors", "2 channels"],
     );
     desk.refused(2, &["analyze", "b.json", "--delay-error", "0.1,nan"], &["nan", "10ps"]);
-    desk.refused(2, &["analyze", "b.json", "--certify", "--delay-error", "0,0"], &["--certify"]);
+    let both = ["analyze", "b.json", "--delay-box", "1ps", "--delay-error", "0,0"];
+    desk.refused(2, &both, &["--delay-error"]);
 }
 
 #[test]

@@ -12,18 +12,9 @@ pub enum IoError {
     /// The operating system refused, or a file could not be read or written as a whole.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The thread that read an input ended before the input did. This is a bug of this program.
-    #[error(
-        "{}: its reader ended before the input did, so the rest is not known; this is a fault of hybank, please report it",
-        Quoted(.file)
-    )]
-    ReaderDied {
-        /// Name of the input.
-        file: String,
-    },
     /// The first bytes are not those of a WAV file.
     #[error(
-        "{}: not a WAV file (byte 0 holds {found}, where RIFF, RF64 or BW64 is expected); raw samples need a format name such as f32le, and a table through a pipe the format csv",
+        "{}: not a WAV file (byte 0 holds {found}, where RIFF, RF64 or BW64 is expected); raw samples need a format name such as f32le, a table through a pipe the format csv, and other recordings their usual ending",
         Quoted(.file)
     )]
     NotWav {

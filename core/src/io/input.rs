@@ -98,7 +98,9 @@ impl Input {
                 // A reader that has come to the end of its input says so.
                 recv(self.messages) -> message => match message {
                     Ok(message) => break message?,
-                    Err(_) => return Err(IoError::ReaderDied { file: self.name.clone() }),
+                    Err(_) => return Err(self.unfit(
+                        "its reader ended before it did; this is a fault of hybank, please report it".into(),
+                    )),
                 },
                 recv(stop) -> _ => return Ok(false),
                 default(PATIENCE) => wait.go_on(),
@@ -148,14 +150,14 @@ impl Input {
         }
         if !lost.timestamps.is_empty() {
             return Err(
-                self.timing_fault("it has captures of its own; leave out the lines with sample_start".into())
+                self.unfit("it has captures of its own; leave out the lines with sample_start".into())
             );
         }
         lost.timestamps = self.notes.timestamps.clone();
         Ok(())
     }
 
-    pub(super) fn timing_fault(&self, problem: String) -> IoError {
+    pub(super) fn unfit(&self, problem: String) -> IoError {
         IoError::unfit(&self.name)(problem)
     }
 

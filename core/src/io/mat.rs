@@ -77,25 +77,17 @@ pub fn open_mat(
 
 /// Refuses files of other versions, by their header.
 fn check_header(file: &mut (impl Read + Seek)) -> Result<(), String> {
-    const REMEDY: &str =
-        "save it in MATLAB with save(\"x.mat\", \"x\", \"-v7\") or in Python with scipy.io.savemat";
     let mut bytes = [0; HEADER];
     if file.seek(SeekFrom::Start(0)).is_err() {
         return Err("its variables are in any order, which a pipe cannot give; save it to a file".to_owned());
     }
     let filled = fill(file, &mut bytes).map_err(|error| format!("cannot read its header: {error}"))?;
-    if bytes.starts_with(b"\x89HDF") || bytes.starts_with(b"MATLAB 7.3") {
-        return Err(format!("it is of version 7.3 (HDF5), which is not read; {REMEDY}"));
+    if filled == HEADER && !bytes.starts_with(b"MATLAB 7.3") && bytes.ends_with(b"\x00\x01IM") {
+        return Ok(());
     }
-    if filled < HEADER {
-        return Err(format!("it has {filled} bytes, and the header alone has {HEADER}; {REMEDY}"));
-    }
-    match bytes[124..] {
-        [0, 1, b'I', b'M'] => Ok(()),
-        [.., b'M', b'I'] => Err(format!("its numbers are big-endian, which is not read; {REMEDY}")),
-        [low, high, b'I', b'M'] => Err(format!("its version {:?} is not 5; {REMEDY}", [high, low])),
-        _ => Err(format!("bytes 126 and 127 are not IM as in version 5; {REMEDY}")),
-    }
+    Err("its header is not that of versions 5 to 7.2 with little-endian numbers (7.3 is HDF5); save it in MATLAB with \
+         save(\"x.mat\", \"x\", \"-v7\") or in Python with scipy.io.savemat"
+        .to_owned())
 }
 
 /// All variables in their order.
@@ -245,48 +237,35 @@ impl Variable {
 
     /// The header of its samples.
     fn array(&self) -> Result<ArrayHeader, String> {
-        if self.is_logical {
-            return Err("it is logical: true and false are no samples; save what they mean as numbers".into());
-        }
-        let format = match self.class {
-            6 => PcmFormat::F64Le,
-            7 => PcmFormat::F32Le,
-            8 => PcmFormat::S8,
-            9 => PcmFormat::U8,
-            10 => PcmFormat::S16Le,
-            11 => PcmFormat::U16Le,
-            12 => PcmFormat::S32Le,
-            13 => PcmFormat::U32Le,
-            14 => PcmFormat::S64Le,
-            _ => {
-                return Err(format!(
-                    "it is {}; save double, single, int8 to int64 or uint8 to uint32, for example double(x)",
-                    self.class_name()
-                ));
-            }
+        let Some(format) = self.class().1.filter(|_| !self.is_logical) else {
+            let class = if self.is_logical { "logical" } else { self.class().0 };
+            return Err(format!(
+                "it is {class}; save double, single, int8 to int64 or uint8 to uint32, for example double(x)"
+            ));
         };
         let shape = self.shape.clone();
         Ok(ArrayHeader { format, is_complex: self.is_complex, shape, is_column_major: true, offset: 0 })
     }
 
-    fn class_name(&self) -> &'static str {
+    /// The name of its class, and the format of samples of this class.
+    fn class(&self) -> (&'static str, Option<PcmFormat>) {
         match self.class {
-            1 => "a cell array",
-            2 => "a struct",
-            3 | 16 | 17 => "an object",
-            4 => "text",
-            5 => "a sparse matrix",
-            6 => "double",
-            7 => "single",
-            8 => "int8",
-            9 => "uint8",
-            10 => "int16",
-            11 => "uint16",
-            12 => "int32",
-            13 => "uint32",
-            14 => "int64",
-            15 => "uint64",
-            _ => "of an unknown class",
+            1 => ("a cell array", None),
+            2 => ("a struct", None),
+            3 | 16 | 17 => ("an object", None),
+            4 => ("text", None),
+            5 => ("a sparse matrix", None),
+            6 => ("double", Some(PcmFormat::F64Le)),
+            7 => ("single", Some(PcmFormat::F32Le)),
+            8 => ("int8", Some(PcmFormat::S8)),
+            9 => ("uint8", Some(PcmFormat::U8)),
+            10 => ("int16", Some(PcmFormat::S16Le)),
+            11 => ("uint16", Some(PcmFormat::U16Le)),
+            12 => ("int32", Some(PcmFormat::S32Le)),
+            13 => ("uint32", Some(PcmFormat::U32Le)),
+            14 => ("int64", Some(PcmFormat::S64Le)),
+            15 => ("uint64", None),
+            _ => ("of an unknown class", None),
         }
     }
 
@@ -299,7 +278,7 @@ impl Variable {
 impl fmt::Display for Variable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let complex = if self.is_complex { "complex " } else { "" };
-        write!(f, "{} ({}, {complex}{})", Quoted(&self.name), self.shape_text(), self.class_name())
+        write!(f, "{} ({}, {complex}{})", Quoted(&self.name), self.shape_text(), self.class().0)
     }
 }
 

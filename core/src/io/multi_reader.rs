@@ -144,7 +144,7 @@ impl MultiReader {
     /// Waits until every input has a frame, and tells `on_stall` of those that give none.
     ///
     /// # Errors
-    /// The system's refusal to read one of them, or [`IoError::ReaderDied`].
+    /// The system's refusal to read one of them.
     pub fn wait(&mut self, on_stall: OnStall<'_>) -> Result<Arrival, IoError> {
         for i in 0..self.inputs.len() {
             self.inputs[i].grouped.gather(false);
@@ -248,10 +248,10 @@ impl MultiReader {
         for (input, lost) in inputs {
             let per_frame = input.grouped.per_frame() as u64;
             let breaks = lost.timestamps.breaks(origin.saturating_mul(per_frame));
-            let breaks = breaks.map_err(|problem| input.timing_fault(problem))?;
+            let breaks = breaks.map_err(|problem| input.unfit(problem))?;
             let frames = breaks.iter().map(|next| next.lost).fold(0, u64::saturating_add);
             if frames / per_frame > max_lost {
-                return Err(input.timing_fault(too_many_lost(frames / per_frame, max_lost)));
+                return Err(input.unfit(too_many_lost(frames / per_frame, max_lost)));
             }
             input.grouped.aligned.lose(breaks, lost);
         }

@@ -18,13 +18,11 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Sigmf,
-    /// A SigMF recording in an archive, which is not read.
-    Archive,
     Csv,
     Npy,
     Mat,
     Flac,
-    /// Another recording that would have to be decoded.
+    /// A recording that would have to be decoded or unpacked.
     Encoded,
     Raw,
     Wav,
@@ -36,13 +34,12 @@ impl Kind {
         let extension = path.extension().and_then(|extension| extension.to_str());
         match extension.map(str::to_ascii_lowercase).as_deref() {
             _ if is_sigmf(path) => Self::Sigmf,
-            Some("sigmf") => Self::Archive,
             Some("csv" | "tsv") => Self::Csv,
             Some("npy") => Self::Npy,
             Some("flac") if cfg!(feature = "flac") => Self::Flac,
-            Some("flac" | "mp3" | "aif" | "aiff" | "aifc" | "ogg" | "oga" | "opus" | "m4a" | "aac") => {
-                Self::Encoded
-            }
+            Some(
+                "flac" | "mp3" | "aif" | "aiff" | "aifc" | "ogg" | "oga" | "opus" | "m4a" | "aac" | "sigmf",
+            ) => Self::Encoded,
             _ if mat_variable(path).is_some() => Self::Mat,
             Some("wav" | "wave" | "bwf" | "rf64") => Self::Wav,
             _ => match coding {
@@ -116,7 +113,6 @@ impl InputSource {
         let (path, name) = (self.path.as_path(), self.name());
         Ok(match Kind::of(path, self.coding) {
             Kind::Sigmf => Box::new(ByteFrames::new(SigmfReader::open(path)?)),
-            Kind::Archive => return Err(unread(path, EXTRACT)),
             Kind::Csv => Box::new(TableReader::new(self.stream()?, &name, &self.table)?),
             Kind::Npy => Box::new(ByteFrames::new(open_npy(open_file(path)?, &name)?)),
             Kind::Mat => {
@@ -130,8 +126,8 @@ impl InputSource {
             #[cfg(feature = "flac")]
             Kind::Flac => Box::new(super::flac::FlacReader::open(open_file(path)?, &name)?),
             #[cfg(not(feature = "flac"))]
-            Kind::Flac => return Err(unread(path, &decode(path))),
-            Kind::Encoded => return Err(unread(path, &decode(path))),
+            Kind::Flac => return Err(unread(path)),
+            Kind::Encoded => return Err(unread(path)),
             Kind::Raw => Box::new(ByteFrames::new(RawReader { source: self.clone(), bytes: None })),
             Kind::Wav => Box::new(ByteFrames::new(WavReader::new(self.stream()?, &name)?)),
         })
@@ -148,28 +144,16 @@ impl InputSource {
     }
 }
 
-/// Why archives are not read.
-const EXTRACT: &str = "it is an archive; extract the recording with tar -xf and give its .sigmf-meta";
-
-/// Why a recording that must be decoded is not read.
-fn decode(path: &Path) -> String {
-    let is_aiff = path
-        .extension()
-        .is_some_and(|ending| ending.to_ascii_lowercase().to_string_lossy().starts_with("aif"));
-    if is_aiff {
-        return format!("AIFF is not read; convert it: ffmpeg -i {0} -c:a pcm_f32le {0}.wav", Quoted(path));
-    }
-    let flac = if cfg!(feature = "flac") { "" } else { "FLAC with the feature flac, " };
-    format!(
-        "hybank does not decode it: lossy formats do not keep time to the picosecond; give PCM ({flac}WAV, or a \
-         pipe: ffmpeg -i {} -f wav -c:a pcm_f32le - | hybank fuse BANK.json -)",
-        Quoted(path)
-    )
-}
-
 /// Refuses a recording, or a name that does not exist, which is the more useful message.
-fn unread(path: &Path, problem: &str) -> IoError {
-    let unfit = || IoError::unfit(&path.display().to_string())(problem.to_owned());
+fn unread(path: &Path) -> IoError {
+    let unfit = || {
+        let flac = if cfg!(feature = "flac") { "" } else { "FLAC with the feature flac, " };
+        IoError::unfit(&path.display().to_string())(format!(
+            "it is not decoded here; give PCM ({flac}WAV, the .sigmf-meta of an archive, or a pipe: ffmpeg -i {} -f wav \
+             -c:a pcm_f32le - | hybank fuse BANK.json -)",
+            Quoted(path)
+        ))
+    };
     open_file(path).err().unwrap_or_else(unfit)
 }
 

@@ -418,4 +418,4 @@ pub(super) fn output_sizes(system: &StateSpace) -> Result<Vec<f64>, LtiError> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -21,22 +21,6 @@ use upper::certificate;
 /// twice the least excess of a certificate.
 const NARROW_INTERVAL: f64 = 2e-8;
 
-/// Proves the bank's norm from both sides; see [`crate::verify`] for how.
-///
-/// ```
-/// use hybank::{bank::Bank, design::certify};
-/// let bank = Bank::from_json(include_str!("../../../filters/thesis-fir.json"), "thesis-fir.json")?;
-/// let proven = certify(&bank)?;
-/// assert!(proven.upper < 0.039933 && proven.upper - proven.attained < 1e-7 * proven.upper);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
-/// # Errors
-/// As [`super::analyze`]; [`DesignError::NotCertified`] if no certificate was found.
-pub fn certify(bank: &Bank) -> Result<Verified, DesignError> {
-    Ok(prove(bank, &bank.gamma, &Stop::default())?.1)
-}
-
 /// A proven lower bound of the norm of `bank`, its gain at a frequency in radians per slow period; `None`
 /// where no arithmetic resolves it.
 pub(super) fn proven_gain(bank: &Bank, frequency: f64) -> Result<Option<f64>, DesignError> {

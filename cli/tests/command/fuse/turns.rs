@@ -1,6 +1,6 @@
 //! One file or pipe in which converters take turns.
 
-use crate::support::{Desk, bytes, wav};
+use crate::support::{Desk, bytes, wav, words};
 use serde_json::json;
 
 /// So that no sample is beyond full scale.
@@ -86,17 +86,7 @@ fn timestamps_count_whole_turns() {
             json!({ "core:datatype": "rf32_le", "core:sample_rate": 3000.0, "core:version": "1.0.0" });
         desk.write("capture.sigmf-meta", json!({ "global": global, "captures": captures }).to_string());
     };
-    let args = [
-        "fuse",
-        "three.json",
-        "capture.sigmf-meta",
-        "-o",
-        "y.wav",
-        "--interleaved",
-        "3",
-        "--gaps",
-        "--force",
-    ];
+    let args = words("fuse three.json capture.sigmf-meta -o y.wav --interleaved 3 --gaps --force");
     meta(9);
     // The gap is reported.
     assert!(desk.run(&args, &[]).status.success());

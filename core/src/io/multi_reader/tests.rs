@@ -59,13 +59,14 @@ fn a_reader_that_dies_is_an_error_and_not_the_end_of_its_input() {
     assert_eq!(reader.wait(&mut |_| {}).unwrap(), Arrival::Frames(3));
     reader.consume(3);
     let error = reader.wait(&mut |_| {}).unwrap_err();
-    assert!(matches!(&error, IoError::ReaderDied { file } if file == "dying"), "{error}");
+    assert!(error.to_string().starts_with("dying: its reader ended before it did;"), "{error}");
 }
 
 #[test]
 fn a_panic_in_a_reader_is_an_error_too() {
     let mut reader = reader(|_messages, _| panic!("a reader that panics, for this test"));
-    assert!(matches!(reader.wait(&mut |_| {}), Err(IoError::ReaderDied { .. })));
+    let error = reader.wait(&mut |_| {}).unwrap_err();
+    assert!(error.to_string().contains("its reader ended before it did;"), "{error}");
 }
 
 #[test]

@@ -83,17 +83,6 @@ impl FromStr for TimeColumn {
     }
 }
 
-/// The name that reads as it.
-impl fmt::Display for TimeColumn {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Found => Ok(()),
-            Self::None => f.write_str("none"),
-            Self::Is(column) => column.fmt(f),
-        }
-    }
-}
-
 /// What stands between two cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Delimiter {
@@ -135,18 +124,6 @@ impl FromStr for Delimiter {
     }
 }
 
-/// The name that reads as it.
-impl fmt::Display for Delimiter {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Semicolon => "semicolon",
-            Self::Tab => "tab",
-            Self::Comma => "comma",
-            Self::Space => "space",
-        })
-    }
-}
-
 /// The mark before the decimals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Decimal {
@@ -165,31 +142,5 @@ impl FromStr for Decimal {
             "comma" | "," => Ok(Self::Comma),
             _ => Err("give point or comma".to_owned()),
         }
-    }
-}
-
-/// The name that reads as it.
-impl fmt::Display for Decimal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(if *self == Self::Point { "point" } else { "comma" })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_shown_reads_as_the_same() {
-        for delimiter in Delimiter::ALL {
-            assert_eq!(delimiter.to_string().parse(), Ok(delimiter));
-        }
-        for text in ["none", "2", "Time (s)"] {
-            assert_eq!(text.parse::<TimeColumn>().unwrap().to_string(), text);
-        }
-        for decimal in [Decimal::Point, Decimal::Comma] {
-            assert_eq!(decimal.to_string().parse(), Ok(decimal));
-        }
-        assert!("0".parse::<Column>().is_err() && "".parse::<Column>().is_err());
     }
 }

@@ -6,7 +6,7 @@ use crate::design::problem::Problem;
 use crate::spec::Spec;
 
 /// Channels that all have feedthrough: no other plant has a regular weight.
-fn plant(latency: usize, delays: &str) -> LiftedPlant {
+pub(in crate::design::methods) fn plant(latency: usize, delays: &str) -> LiftedPlant {
     let text = format!(
         "fast_period = 1.0\nratio = 2\nlatency = {latency}\n\
          target = {{ filter = {{ num = [2.0], den = [1.0, 2.0] }} }}\n\

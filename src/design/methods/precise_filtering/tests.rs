@@ -1,19 +1,8 @@
 //! Against double precision where that suffices, and against its own equation.
 
-use super::super::filtering::Innovations;
+use super::super::filtering::{Innovations, tests::plant};
 use super::*;
 use crate::arithmetic::{DoubleDouble, Float512};
-use crate::design::problem::Problem;
-use crate::spec::Spec;
-
-fn plant(latency: usize, delays: &str) -> LiftedPlant {
-    let text = format!(
-        "fast_period = 1.0\nratio = 2\nlatency = {latency}\n\
-         target = {{ filter = {{ num = [2.0], den = [1.0, 2.0] }} }}\n\
-         channel = [{delays}]\ndesign = {{ method = \"iir\" }}"
-    );
-    LiftedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), latency).unwrap())
-}
 
 /// All channels with feedthrough, and one delayed by whole periods.
 fn plants() -> [LiftedPlant; 3] {

@@ -282,6 +282,7 @@ fn options_say_what_cannot_be_found() {
     assert_eq!((found.channels, found.rate, found.samples), (2, Some(2000.0), vec![0.5, 7.0, 1.5, 8.0]));
     let other = TableOptions { columns: parse(&["ampere"]), ..options };
     assert!(read_with(text, &other).err().unwrap().contains("columns called ampere"));
+    assert!("0".parse::<Column>().is_err() && "".parse::<Column>().is_err());
     let tabs = TableOptions { delimiter: Some(Delimiter::Tab), ..TableOptions::default() };
     assert_eq!(read_with("1,5\t2\n0,5\t3\n", &tabs).unwrap().samples, [1.5, 2.0, 0.5, 3.0]);
 }
