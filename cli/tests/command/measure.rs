@@ -1,4 +1,4 @@
-//! The command `measure`.
+//! The command `measure`, and `fuse --measure`.
 
 use crate::support::random::Random;
 use crate::support::{Desk, THESIS, number, text, wav};
