@@ -44,11 +44,13 @@ pub(super) struct InstantArgs {
 /// The option that `fuse` and `stream` have.
 #[derive(Debug, clap::Args)]
 pub(super) struct TrackArgs {
-    /// Follow delays that change: drift.jsonl of `align --trim`, or a table (.csv) of a time and the delay
-    /// of each channel, both in seconds, with headings, as `time,delay 1,delay 2`. Columns with the gain of
-    /// each channel, and then with its offset, may follow. Taps are made for the delays at hand in place of
-    /// those of the spec, and samples lose the offset and the gain at hand; lost samples are left out.
-    /// `stream` gives the samples of `fuse`, blocks of 64 frames as soon as the 38 frames after them are there
+    /// Follow delays that change: drift.jsonl of `align --trim`, or a table (.csv)
+    ///
+    /// The table has a time and the delay of each channel, both in seconds, with headings, as
+    /// `time,delay 1,delay 2`. Columns with the gain of each channel, and then with its offset, may follow.
+    /// Taps are made for the delays at hand in place of those of the spec, and samples lose the offset and
+    /// the gain at hand; lost samples are left out. `stream` gives the samples of `fuse`, blocks of 64
+    /// frames as soon as the 38 frames after them are there.
     #[arg(long, value_name = "FILE", conflicts_with_all =
           ["algorithm", "gaps", "report", "interleaved", "threads"])]
     track: Option<PathBuf>,

@@ -57,8 +57,9 @@ pub(super) fn outputs(
     Ok(Outputs { outputs, error: MeanSquare::mean(&errors) })
 }
 
-/// The outputs of a block of `count` whose error is computed: one somewhere in each of equal parts. Multiples
-/// of the golden ratio say where, so that over many blocks every phase of any pattern is met equally often.
+/// The outputs of a block of `count` whose error is computed: one somewhere in each of equal parts.
+/// Multiples of the golden ratio say where, so that over many blocks every phase of any pattern is met
+/// equally often.
 fn looked_at(origin: FastPeriods, count: usize) -> Vec<usize> {
     let parts = ERRORS.min(count);
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);

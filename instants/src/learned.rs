@@ -17,9 +17,9 @@ const FLOOR: f64 = 1e-10;
 /// none of these holds a segment. It is smoothed, because each segment has few degrees of freedom, and has a
 /// floor 100 dB below its largest density.
 ///
-/// The signal is an estimate: what passed `gain`, by bands, was the signal with noise of the density `noise`,
-/// as power per cycle per fast period over both signs of frequency. So its spectrum is divided by the square
-/// of the gain, and the noise is subtracted.
+/// The signal is an estimate: what passed `gain`, by bands, was the signal with noise of the density
+/// `noise`, as power per cycle per fast period over both signs of frequency. So its spectrum is divided by
+/// the square of the gain, and the noise is subtracted.
 pub fn learned(
     signal: &[f64],
     parts: &[Range<usize>],

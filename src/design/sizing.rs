@@ -54,9 +54,9 @@ impl Sizing {
     /// The sizes for `spec` and its `problem`. `comparison` follows and ends the designs that are compared.
     ///
     /// # Errors
-    /// [`DesignError::OutOfReach`] for a latency that the taps do not reach; [`DesignError::FigureOutOfReach`]
-    /// or [`DesignError::FigureMissed`] if no number of taps has the SNR that the spec asks for;
-    /// [`DesignError::Stopped`].
+    /// [`DesignError::OutOfReach`] for a latency that the taps do not reach;
+    /// [`DesignError::FigureOutOfReach`] or [`DesignError::FigureMissed`] if no number of taps has the SNR
+    /// that the spec asks for; [`DesignError::Stopped`].
     pub(super) fn new(
         spec: &Spec,
         problem: &Problem,

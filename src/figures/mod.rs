@@ -20,9 +20,9 @@
 //! One channel alone with its Wiener filter, plain interleaving, each channel's own correction, and the
 //! cubic spline through all samples, for the same signal, noise and uncertainty, from their exact
 //! periodically time-varying responses. Each has an SNR, and an SFDR unless it is one channel alone. Beside
-//! them stand the taps of least squares that are as long as the bank's. A bank of one channel is not compared
-//! with one channel. Where the spec states no noise, all are compared with converters of 16 bits: without any
-//! noise one channel alone would be exact wherever the signal fits into it.
+//! them stand the taps of least squares that are as long as the bank's. A bank of one channel is not
+//! compared with one channel. Where the spec states no noise, all are compared with converters of 16 bits:
+//! without any noise one channel alone would be exact wherever the signal fits into it.
 
 mod correction;
 mod integral;

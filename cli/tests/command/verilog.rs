@@ -289,8 +289,8 @@ fn a_loadable_module_depends_on_no_tap() {
     }
 }
 
-/// A channel with a nonlinearity, one with none: the bits of the model for all codes, in a clean module, with
-/// a wrong word of a table found.
+/// A channel with a nonlinearity, one with none: the bits of the model for all codes, in a clean module,
+/// with a wrong word of a table found.
 #[test]
 fn tables_take_out_nonlinearities() {
     let desk = Desk::empty();

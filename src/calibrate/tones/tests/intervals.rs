@@ -16,8 +16,8 @@ fn draws(what: &str) -> usize {
     if trials::is_slow(what) { 100 } else { 12 }
 }
 
-/// Tones of amplitude 1 sampled at instants that err by Gaussian numbers of `jitter` fast periods: their real
-/// parts, or the exponentials themselves.
+/// Tones of amplitude 1 sampled at instants that err by Gaussian numbers of `jitter` fast periods: their
+/// real parts, or the exponentials themselves.
 fn jittered(
     truth: &Spec,
     list: &[f64],
