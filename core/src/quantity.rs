@@ -177,25 +177,25 @@ pub fn time(text: &str) -> Result<WrittenTime, QuantityError> {
     if matches!(written.unit, "samples" | "sample") {
         return written.scaled(0).map(|value| WrittenTime::Samples(FastPeriods(value)));
     }
-    written.with_prefix("s", TIMES).map(|value| WrittenTime::Seconds(Seconds(value)))
+    written.with_prefix(&["s"], TIMES).map(|value| WrittenTime::Seconds(Seconds(value)))
 }
 
-/// A frequency: hertz with an SI prefix. A number without unit is in hertz.
+/// A frequency: hertz with an SI prefix. A number without unit is in hertz; `48k` is 48 kHz, as audio tools
+/// have it.
 ///
 /// # Errors
 /// [`QuantityError`]. Any finite frequency is legal, negative ones too.
 pub fn frequency(text: &str) -> Result<Hertz, QuantityError> {
-    Written::split(text, FREQUENCIES)?.with_prefix("Hz", FREQUENCIES).map(Hertz)
+    Written::split(text, FREQUENCIES)?.with_prefix(&["Hz"], FREQUENCIES).map(Hertz)
 }
 
-/// A rate of samples: `S/s` or hertz with an SI prefix, as in `1 GS/s`. A number without unit is in hertz.
+/// A rate of samples: `S/s` or hertz with an SI prefix, as in `1 GS/s` and `48k`. A number without unit is
+/// in hertz.
 ///
 /// # Errors
 /// [`QuantityError`]. Any finite rate is legal, negative ones too.
 pub fn rate(text: &str) -> Result<Hertz, QuantityError> {
-    let written = Written::split(text, RATES)?;
-    let unit = if written.unit.ends_with("S/s") { "S/s" } else { "Hz" };
-    written.with_prefix(unit, RATES).map(Hertz)
+    Written::split(text, RATES)?.with_prefix(&["S/s", "Hz"], RATES).map(Hertz)
 }
 
 /// The full scale of a capture: a number above 0, or the codes of a converter, `8bits` or `u8bits`.
@@ -289,11 +289,13 @@ impl<'a> Written<'a> {
         if value.is_finite() { Ok(value) } else { Err(too_large()) }
     }
 
-    /// The number in `unit`; without any unit it stands for the same.
-    fn with_prefix(&self, unit: &str, example: &'static str) -> Result<f64, QuantityError> {
+    /// The number in the first of `units` that it has, with any prefix; without any unit it stands for the
+    /// same.
+    fn with_prefix(&self, units: &[&str], example: &'static str) -> Result<f64, QuantityError> {
         let prefix = match self.unit {
             "" => Some(""),
-            written => written.strip_suffix(unit),
+            thousands @ ("k" | "M" | "G") if units.contains(&"Hz") => Some(thousands),
+            written => units.iter().find_map(|unit| written.strip_suffix(unit)),
         };
         let known = prefix.and_then(|prefix| PREFIXES.iter().find(|(name, _)| *name == prefix));
         known.map_or_else(|| Err(self.unknown_unit(example)), |&(_, power)| self.scaled(power))

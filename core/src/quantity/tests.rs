@@ -27,6 +27,8 @@ fn prefixes_move_the_decimal_point_exactly() {
     assert_eq!(frequency("1.2GHz"), Ok(Hertz(1.2e9)));
     assert_eq!(frequency("9 kHz"), Ok(Hertz(9000.0)));
     assert_eq!(frequency("50"), Ok(Hertz(50.0)));
+    assert_eq!((frequency("44.1k"), rate("2.4 M")), (Ok(Hertz(44_100.0)), Ok(Hertz(2.4e6))));
+    assert!(time("10k").is_err() && frequency("10m").is_err());
     assert_eq!(relative("1%"), Ok(0.01));
     assert_eq!(relative("540 ppm"), Ok(540e-6));
     assert_eq!(relative("-0.02"), Ok(-0.02));
