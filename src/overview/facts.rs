@@ -35,7 +35,7 @@ pub struct Facts {
     pub title: String,
     /// The spec in units of the user.
     pub understood: String,
-    /// In the user's terms: signal-to-noise ratio, images, error of gain, and the simple ways. Then gamma,
+    /// In the user's terms: signal-to-noise ratio, images, error of gain, and the usual ways. Then gamma,
     /// its bounds and the noise gain.
     pub error: Vec<Fact>,
     /// Method, latency, size and operations.
