@@ -103,7 +103,8 @@ def test_figures_hold_what_a_wanted_snr_and_the_converters_say():
     keywords = {**KEYWORDS, "channels": channels, "signal": "8 kHz", "latency": 8, "method": "h2"}
     wanted = hb.design(**{**keywords, "taps": None}, target_snr_db=55)
     figures = wanted.figures()
-    assert figures.snr.noise_db is not None and figures.snr_16_bits_db is None
+    assert figures.snr.bits_db is not None and figures.snr.jitter_db is not None and figures.snr.noise_db is None
+    assert figures.snr_16_bits_db is None
     assert figures.snr.total_db < figures.snr.signal_db
     fewer = hb.design(**{**keywords, "taps": wanted.taps.shape[1] - 1})
     assert figures.snr.total_db >= 55 > fewer.figures().snr.total_db
