@@ -18,6 +18,8 @@ const PHASE_LAGS: i32 = 16;
 /// comes there last.
 const PHASE_FREQUENCIES: i32 = 8;
 const LOW_FREQUENCY: f64 = PI / 4.0;
+/// Share of the spectrum of white noise of the same correlation that low frequencies have at least.
+const LEAST_LOW: f64 = 0.5;
 
 /// Where a piece of the reference is looked for in another recording.
 #[derive(Debug, Clone, Copy)]
@@ -55,7 +57,8 @@ impl LocalLag {
         let shifts = 1..2 * margin;
         let best = shifts.clone().max_by(|a, b| sums[*a].abs().total_cmp(&sums[*b].abs())).unwrap_or(margin);
         let at = sums[best];
-        let part = if is_white(&own) { phase_lag(&sums, best) } else { vertex(&sums, best) };
+        let by_phase = if is_white(&own) { phase_lag(&sums, best) } else { None };
+        let part = by_phase.unwrap_or_else(|| vertex(&sums, best));
         let lag = (begin + best as i64 - first as i64) as f64 + part;
         let height = |n: usize| sums[n].abs();
         let is_peak = |n: usize| height(n) >= height(n - 1).max(height(n + 1));
@@ -82,25 +85,27 @@ fn vertex(sums: &[f64], best: usize) -> f64 {
     if part.abs() <= 0.5 { part } else { 0.0 }
 }
 
-/// The delay that low frequencies have beyond the highest correlation, by their phases.
+/// The delay that low frequencies have beyond the highest correlation, by their phases. `None` if little of
+/// the signal is there.
 ///
 /// A signal that goes beyond half the rate folds back, and two recordings of it differ there by more than a
 /// delay. Their correlation has its peak at whole samples, whatever the delay is between.
-fn phase_lag(sums: &[f64], best: usize) -> f64 {
+fn phase_lag(sums: &[f64], best: usize) -> Option<f64> {
     let size = sums.len() as i64;
     let value = |k: i32| sums[(best as i64 + i64::from(k)).rem_euclid(size) as usize] * sums[best].signum();
     let window = |k: i32| (0.5 * PI * f64::from(k) / f64::from(PHASE_LAGS + 1)).cos().powi(2);
     let spectrum = |w: f64| -> Complex<f64> {
         (-PHASE_LAGS..=PHASE_LAGS).map(|k| Complex::from_polar(value(k) * window(k), -w * f64::from(k))).sum()
     };
-    let (mut phases, mut weights) = (0.0, 0.0);
+    let (mut phases, mut weights, mut power) = (0.0, 0.0, 0.0);
     for k in 1..=PHASE_FREQUENCIES {
         let w = LOW_FREQUENCY * f64::from(k) / f64::from(PHASE_FREQUENCIES);
         let found = spectrum(w);
         phases -= found.norm_sqr() * w * found.arg();
         weights += found.norm_sqr() * w * w;
+        power += found.norm_sqr() / f64::from(PHASE_FREQUENCIES);
     }
-    if weights > 0.0 { (phases / weights).clamp(-1.0, 1.0) } else { 0.0 }
+    (power > (LEAST_LOW * sums[best]).powi(2)).then(|| (phases / weights).clamp(-1.0, 1.0))
 }
 
 #[cfg(test)]
@@ -108,20 +113,32 @@ mod tests {
     use super::*;
     use crate::random::Random;
 
-    /// Of noise up to 1.7 times half the rate, by sums of many tones.
+    /// Noise between two frequencies in radians per sample, later by `delay` samples: a sum of many tones.
+    fn noise(low: f64, high: f64, delay: f64) -> Record {
+        let mut random = Random(5);
+        let mut tone = || [low + (high - low) * random.part(), 2.0 * PI * random.part()];
+        let tones: Vec<[f64; 2]> = (0..3000).map(|_| tone()).collect();
+        let at = |n: usize| tones.iter().map(|[w, phase]| (w * (n as f64 - delay) + phase).cos()).sum();
+        Record::new((0..2600).map(at).collect())
+    }
+
+    const PLACE: SearchWindow = SearchWindow { first: 200, length: 2048, expected: 3.0, margin: 20 };
+
     #[test]
     fn a_lag_between_samples_is_found_in_noise_beyond_half_the_rate() {
-        let mut random = Random(5);
-        let tones: Vec<[f64; 2]> =
-            (0..3000).map(|_| [1.7 * PI * random.part(), 2.0 * PI * random.part()]).collect();
-        let samples = |delay: f64| -> Record {
-            let at = |n: usize| tones.iter().map(|[w, phase]| (w * (n as f64 - delay) + phase).cos()).sum();
-            Record::new((0..2600).map(at).collect())
-        };
-        let reference = samples(0.0);
+        let reference = noise(0.0, 1.7 * PI, 0.0);
         for delay in [3.0, 3.2, 3.4, 3.6, 3.8] {
-            let place = SearchWindow { first: 200, length: 2048, expected: 3.0, margin: 20 };
-            let found = LocalLag::new(&reference, &samples(delay), place);
+            let found = LocalLag::new(&reference, &noise(0.0, 1.7 * PI, delay), PLACE);
+            assert!((found.beyond + 3.0 - delay).abs() < 0.1, "{delay}: {}", found.beyond);
+        }
+    }
+
+    /// Low frequencies of which there are none say nothing.
+    #[test]
+    fn a_lag_is_found_in_a_band_without_low_frequencies() {
+        let reference = noise(0.35 * PI, 0.9 * PI, 0.0);
+        for delay in [3.0, 3.1, 3.2] {
+            let found = LocalLag::new(&reference, &noise(0.35 * PI, 0.9 * PI, delay), PLACE);
             assert!((found.beyond + 3.0 - delay).abs() < 0.1, "{delay}: {}", found.beyond);
         }
     }

@@ -26,6 +26,12 @@ pub enum CaptureError {
         /// Its channels.
         channels: usize,
     },
+    /// A gain of a table that is above 0 at one time and below at another.
+    #[error("the gain of channel {channel} changes its sign, so it is 0 between; give one polarity")]
+    Polarity {
+        /// From 1.
+        channel: usize,
+    },
     /// A gain or an offset of a table.
     #[error("a {what} of channel {channel}: {problem}")]
     Level {

@@ -32,7 +32,7 @@ impl LevelTrack {
     /// Of a bank at ascending times. Without `offsets` they are those of the bank.
     ///
     /// # Errors
-    /// [`CaptureError::Level`] for a gain or an offset that no spec may have.
+    /// [`CaptureError::Level`] for a gain or an offset that no spec may have; [`CaptureError::Polarity`].
     pub fn new(
         bank: &Bank,
         times: Vec<Seconds>,
@@ -43,6 +43,10 @@ impl LevelTrack {
         let offsets = offsets.unwrap_or_else(of_bank);
         check("gain", &gains, check_gain)?;
         check("offset", &offsets, check_offset)?;
+        let changes_sign = |list: &Vec<f64>| list.iter().any(|gain| gain.signum() != list[0].signum());
+        if let Some(i) = gains.iter().position(changes_sign) {
+            return Err(CaptureError::Polarity { channel: i + 1 });
+        }
         Ok(Self { bank: bank.clone(), times, gains, offsets })
     }
 
@@ -124,5 +128,7 @@ mod tests {
         let refused =
             LevelTrack::new(&bank, times(), vec![vec![1.0, f64::NAN]], None).unwrap_err().to_string();
         assert!(refused.contains("gain of channel 1"), "{refused}");
+        let refused = LevelTrack::new(&bank, times(), vec![vec![1.0, -1.0]], None).unwrap_err();
+        assert!(matches!(refused, CaptureError::Polarity { channel: 1 }));
     }
 }

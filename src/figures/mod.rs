@@ -48,7 +48,7 @@ use crate::units::{CyclesPerFastPeriod, Decibels, Hertz};
 use reconstruction::Reconstruction;
 use snr::Setting;
 
-/// By how many decibels a bank must beat the usual ways to be worth its trouble.
+/// By how many decibels a bank must beat the usual ways to be recommended.
 const LEAST_GAIN: Decibels = Decibels(1.0);
 
 /// Share of the resolved band that a signal may take, so that a filter can end it.
