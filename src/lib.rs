@@ -8,6 +8,9 @@ pub use hybank_core::{bank, files, io, messages, npy, pipeline, quantity, spec, 
 /// samples.
 pub use hybank_runtime as runtime;
 
+pub use hybank_design::{design, figures, lmi, lti};
+pub use hybank_verify::{analog, verify};
+
 /// The crate `hybank-instants`: signals from samples at known instants.
 pub use hybank_instants as instants;
 
@@ -18,23 +21,15 @@ pub use hybank_linalg as linalg;
 pub use hybank_sampling as sampling;
 
 pub mod align;
-pub mod analog;
-pub(crate) mod arithmetic;
 pub mod calibrate;
 pub mod captures;
-pub mod design;
-pub mod figures;
 pub mod interchange;
-pub mod lmi;
-pub mod lti;
 pub mod measure;
 pub mod merge;
 pub mod overview;
 pub mod plot;
 pub mod simulate;
 pub mod sine_fit;
-
-pub mod verify;
 
 #[cfg(test)]
 use trials::random;

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Writes the digits of the families' tests: low-pass prototypes and band-passes by scipy.signal and by mpmath in
-src/analog/families/reference.txt, and numbers of prototypes by mpmath to 50 digits in digits.txt beside it.
+verify/src/analog/families/reference.txt, and numbers of prototypes by mpmath to 50 digits in digits.txt beside it.
 
 Run from the repository root: python3 tools/analog_reference.py
 Made with scipy 1.17.1 and mpmath 1.4.1.
@@ -18,8 +18,8 @@ import numpy as np
 import scipy.signal as ss
 
 mp.mp.dps = 60
-OUT = "src/analog/families/reference.txt"
-DIGITS_OUT = "src/analog/families/digits.txt"
+OUT = "verify/src/analog/families/reference.txt"
+DIGITS_OUT = "verify/src/analog/families/digits.txt"
 DIGITS = 50
 
 

@@ -15,7 +15,7 @@ version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Carg
 # Bytes of a packed crate; crates.io takes 10 MiB.
 most=1500000
 # In the order of dependence.
-crates=(hybank-linalg hybank-runtime hybank-sampling hybank-core hybank-instants hybank-program hybank hybank-ibr hybank-cli)
+crates=(hybank-linalg hybank-runtime hybank-sampling hybank-core hybank-instants hybank-verify hybank-design hybank-program hybank hybank-ibr hybank-cli)
 
 # crates.io takes five keywords of 20 characters.
 if grep -nE '^keywords = ([^]]*$|.*"[^",]{21,}"|(.*,){5})' {.,linalg,runtime,sampling,core,program,ibr,cli}/Cargo.toml; then

@@ -1,7 +1,7 @@
 //! How the virtual converters of a spec differ from what it says, with the limits of that.
 
 use super::{Analog, Quantiser, Sampler};
-use crate::design::uncertainty::{Refused, of};
+use crate::design::uncertainty::{Refused, in_field};
 use crate::quantity::WrittenTime;
 use crate::spec::{
     ChannelCount, ChannelSpec, Cutoff, Fitting, MAX_LATENCY, Spec, SpecProblem, check_noise, check_offset,
@@ -140,11 +140,11 @@ impl ErrorLists {
         spec: &Spec,
         mut parts: impl Iterator<Item = &'a Analog>,
     ) -> Result<Vec<VirtualConverter>, RefusedError> {
-        of("noise", check_noise(self.noise))?;
+        in_field("noise", check_noise(self.noise))?;
         let quantiser = self.bits.map(|bits| Quantiser::new(bits).ok_or(ErrorRule::Bits));
-        let quantiser = of("bits", quantiser.transpose())?;
+        let quantiser = in_field("bits", quantiser.transpose())?;
         let jitter = self.jitter.map_or(Seconds(0.0), |jitter| jitter.in_seconds(spec.fast_period));
-        of("jitter", parts.try_for_each(|part| check_jitter(jitter, spec.fast_period, part)))?;
+        in_field("jitter", parts.try_for_each(|part| check_jitter(jitter, spec.fast_period, part)))?;
         let channels = spec.channels.len();
         let drift = checked("drift", &self.drift, channels, check_drift)?;
         let most_delay = (spec.fast_period * MAX_LATENCY as f64).0;
@@ -192,7 +192,8 @@ impl ErrorLists {
         let errors = self.cutoffs(spec.channels.len())?;
         for (channel, error) in truth.channels.iter_mut().zip(errors).filter(|(_, error)| *error != 0.0) {
             let scaled = part.scaled(&channel.filter, 1.0 + error);
-            channel.filter = of("cutoff_error", scaled.ok_or(ErrorRule::NoStage(Fitting::Cutoff(part))))?;
+            channel.filter =
+                in_field("cutoff_error", scaled.ok_or(ErrorRule::NoStage(Fitting::Cutoff(part))))?;
         }
         Ok(truth)
     }
@@ -226,8 +227,8 @@ fn checked(
     channels: usize,
     check: impl Fn(f64) -> Result<(), SpecProblem>,
 ) -> Result<Vec<f64>, RefusedError> {
-    of(field, given.iter().try_for_each(|&value| check(value)))?;
-    of(field, for_channels(given, channels))
+    in_field(field, given.iter().try_for_each(|&value| check(value)))?;
+    in_field(field, for_channels(given, channels))
 }
 
 fn check_drift(ppm: f64) -> Result<(), SpecProblem> {

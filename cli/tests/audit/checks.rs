@@ -96,7 +96,8 @@ fn the_judge_agrees_with_brute_force() {
 #[test]
 fn the_families_have_the_poles_of_scipy() {
     let text = fs::read_to_string(
-        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("src/analog/families/reference.txt"),
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+            .join("verify/src/analog/families/reference.txt"),
     );
     let mut dice = Random(0xA0D1);
     let mut tried = 0;
