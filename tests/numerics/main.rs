@@ -15,7 +15,6 @@ mod golden;
 mod hard_designs;
 mod latency;
 mod near_instants;
-mod predictions;
 mod rates;
 mod reduction;
 mod repeated_channels;

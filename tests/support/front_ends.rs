@@ -6,7 +6,7 @@ use hybank_core::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Pas
 use hybank_core::units::{Hertz, Seconds};
 use std::f64::consts::TAU;
 
-pub fn family(family: Family, order: usize, omega: f64) -> FilterSpec {
+pub(crate) fn family(family: Family, order: usize, omega: f64) -> FilterSpec {
     FilterSpec::Family {
         family,
         order: Some(order),
@@ -16,12 +16,12 @@ pub fn family(family: Family, order: usize, omega: f64) -> FilterSpec {
     }
 }
 
-pub fn thesis_filter() -> FilterSpec {
+pub(crate) fn thesis_filter() -> FilterSpec {
     FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] }
 }
 
 /// A bank with arbitrary coefficients; the comparisons hold for good and bad banks.
-pub fn bank(
+pub(crate) fn bank(
     target: FilterSpec,
     filters: Vec<FilterSpec>,
     delays: &[f64],
@@ -62,11 +62,11 @@ pub fn bank(
     }
 }
 
-pub fn alike(filter: &FilterSpec, delays: &[f64], ratio: usize, latency: usize, taps: usize) -> Bank {
+pub(crate) fn alike(filter: &FilterSpec, delays: &[f64], ratio: usize, latency: usize, taps: usize) -> Bank {
     bank(filter.clone(), vec![filter.clone(); delays.len()], delays, ratio, latency, taps)
 }
 
-pub fn cases() -> Vec<(&'static str, Bank)> {
+pub(crate) fn cases() -> Vec<(&'static str, Bank)> {
     let thesis = thesis_filter();
     let eight = [0.0, 1.224, 1.703, 3.193, 4.178, 4.981, 5.882, 6.867];
     let rc = |omega| family(Family::Rc, 1, omega);

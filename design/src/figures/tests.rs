@@ -1,4 +1,5 @@
-//! Figures against closed forms, against stored digits of another route, and against the error system.
+//! Figures against closed forms, against stored digits of another route, against the error system, and
+//! against tones through virtual converters.
 
 use super::powers::{Conditions, NoisePowers, target_power};
 use super::reconstruction::Reconstruction;
@@ -333,4 +334,149 @@ fn the_parts_of_the_ratio_are_its_sum() {
     let powers = [Some(all.signal_db), all.bits_db, all.noise_db, all.jitter_db];
     let sum: f64 = powers.into_iter().flatten().map(|db| 10f64.powf(-0.1 * db.0)).sum();
     assert!((all.total_db.0 + 10.0 * sum.log10()).abs() < 1e-3, "{all:?}");
+}
+
+/// A tone of amplitude 1.
+struct Tone {
+    omega: RadiansPerFastPeriod,
+    phase: f64,
+}
+
+/// Tones at these bins of a period, with phases of their own.
+fn drawn(bins: &[usize], period: usize, random: &mut Random) -> Vec<Tone> {
+    let omega = |bin| RadiansPerFastPeriod(TAU * bin as f64 / period as f64);
+    bins.iter().map(|&bin| Tone { omega: omega(bin), phase: TAU * random.part() }).collect()
+}
+
+/// Samples of the channels and of the target.
+struct Captured {
+    channels: Vec<Vec<f64>>,
+    target: Vec<f64>,
+}
+
+/// Settled tones by their definition: `x_i[k]` = g_i (phi_i * f)(k M - D_i), `y_0[n]` = (phi_0 * f)(n - m0).
+fn captured(problem: &Problem, tones: &[Tone], periods: usize) -> Captured {
+    let through = |front_end: usize, instant: f64| {
+        let of = |tone: &Tone| {
+            let response = problem.front_ends[front_end].response(tone.omega);
+            response.norm() * (tone.omega.0 * instant + tone.phase + response.arg()).sin()
+        };
+        tones.iter().map(of).sum::<f64>()
+    };
+    let samples = problem.channels.iter().map(|channel| {
+        let delay = channel.delay.in_fast_periods().0;
+        let instant = |k: usize| (k * problem.ratio) as f64 - delay;
+        (0..periods).map(|k| channel.gain * through(channel.front_end, instant(k))).collect()
+    });
+    let wanted = |n: usize| through(problem.target, n as f64 - problem.latency as f64);
+    Captured { channels: samples.collect(), target: (0..periods * problem.ratio).map(wanted).collect() }
+}
+
+/// The output of an FIR bank by its definition.
+fn fused(taps: &[Vec<f64>], ratio: usize, captured: &[Vec<f64>]) -> Vec<f64> {
+    let sample = |n: usize| {
+        let (k, p) = (n / ratio, n % ratio);
+        let of_channel = |(f, x): (&Vec<f64>, &Vec<f64>)| {
+            (0..=k).take_while(|j| p + j * ratio < f.len()).map(|j| f[p + j * ratio] * x[k - j]).sum::<f64>()
+        };
+        taps.iter().zip(captured).map(of_channel).sum()
+    };
+    (0..captured[0].len() * ratio).map(sample).collect()
+}
+
+/// Tones at multiples of 1 / (M Q) that do not alias onto each other or onto their mirrors, spread evenly
+/// over a band: over one period of Q frames their errors are orthogonal.
+fn orthogonal_tones(random: &mut Random, [low, high]: [f64; 2], ratio: usize, frames: usize) -> Vec<usize> {
+    let length = (ratio * frames) as f64;
+    let wanted = frames / 5;
+    let mut used = vec![false; frames];
+    let mut tones = Vec::new();
+    for part in 0..wanted {
+        let place = low + (high - low) * (part as f64 + random.part()) / wanted as f64;
+        let bin = (place * length) as usize + 1;
+        let (alias, mirror) = (bin % frames, (frames - bin % frames) % frames);
+        if !used[alias] && !used[mirror] && alias != mirror && (bin as f64) < high * length {
+            used[alias] = true;
+            used[mirror] = true;
+            tones.push(bin);
+        }
+    }
+    tones
+}
+
+fn power(values: impl Iterator<Item = f64>) -> f64 {
+    values.map(|x| x * x).sum()
+}
+
+/// Predicted and measured figures of a random system with virtual converters.
+fn check_prediction(seed: u64) {
+    let mut random = Random(seed);
+    let ratio = random.count(2, 4);
+    let channels = (ratio + random.below(2)).max(2);
+    let order = random.count(1, 4);
+    let cutoff = 0.15 + 0.35 * random.part();
+    let band = 0.1 + 0.3 * random.part();
+    let mut text = format!(
+        "fast_period = 1.0\nratio = {ratio}\nlatency = 12\nsignal = {{ band = {band} }}\n\
+         target = {{ filter = {{ family = \"butterworth\", order = {order}, cutoff = {cutoff} }} }}\n\
+         design = {{ method = \"fir\", taps = {} }}\n",
+        8 * ratio
+    );
+    for i in 0..channels {
+        let delay = ratio as f64 * (i as f64 + 0.6 * random.part()) / channels as f64;
+        let _ = write!(text, "[[channel]]\ndelay = {delay}\ngain = {}\n", 1.0 + 0.1 * random.sample());
+    }
+    let bank =
+        design(&Spec::from_toml(&text, "spec.toml").unwrap(), &DesignOptions::without_proof()).unwrap().bank;
+    let figures = Figures::new(&bank).unwrap();
+    let SynthesisFilters::Fir(taps) = &bank.filters else { panic!("FIR") };
+    let plain = without_signal(bank.spec.as_ref().unwrap(), bank.latency).unwrap();
+    let (frames, settled) = (1021, 8);
+    let simulated = |tones: &[usize], random: &mut Random| {
+        let captured = captured(&plain, &drawn(tones, ratio * frames, random), frames + settled);
+        let output = fused(taps, ratio, &captured.channels);
+        let skip = settled * ratio;
+        (output[skip..].to_vec(), captured.target[skip..].to_vec())
+    };
+    let tones = orthogonal_tones(&mut random, [0.0, band], ratio, frames);
+    let (output, target) = simulated(&tones, &mut random);
+    let error = power(output.iter().zip(&target).map(|(y, z)| y - z));
+    let snr = Decibels::of_power(power(target.iter().copied()) / error).0;
+    let predicted = figures.snr.signal_db.0;
+    println!("seed {seed}: SNR {snr:.2} dB, predicted {predicted:.2} dB");
+    assert!((snr - predicted).abs() < 0.5, "seed {seed}: {snr} dB, predicted {predicted} dB\n{text}");
+    check_image(&figures, &bank, (ratio, frames), |bin| simulated(&[bin], &mut Random(1)).0, seed);
+}
+
+/// The largest line beside the tone of largest image, at the nearest frequency with whole periods.
+fn check_image(
+    figures: &Figures,
+    bank: &Bank,
+    (ratio, frames): (usize, usize),
+    simulated: impl FnOnce(usize) -> Vec<f64>,
+    seed: u64,
+) {
+    let image = figures.image.unwrap();
+    let length = ratio * frames;
+    // Within the band, also where the image is largest at its end.
+    let bin = ((image.hertz.0 * length as f64).floor() as usize).max(1);
+    let lines: Vec<f64> =
+        hybank_linalg::fourier::real_spectrum(&simulated(bin)).iter().map(|x| x.norm()).collect();
+    let folded = bin.min(length - bin);
+    let beside = lines.iter().enumerate().filter(|(k, _)| *k != folded).map(|(_, x)| *x).fold(0.0, f64::max);
+    let measured = Decibels::of_amplitude(beside / lines[folded]).0;
+    let plain = without_signal(bank.spec.as_ref().unwrap(), bank.latency).unwrap();
+    let exact = vec![Deviations::default(); bank.channel_count()];
+    let tones = ToneResponse::of_bank(&bank.filters, plain, exact).unwrap();
+    let there = tones.at(bin as f64 / length as f64);
+    let predicted = Decibels::of_amplitude(there.image).0;
+    println!("seed {seed}: image {measured:.3} dB, predicted {predicted:.3} dB");
+    assert!((measured - predicted).abs() < 0.01, "seed {seed}: {measured} dB, predicted {predicted} dB");
+    assert!(predicted <= image.db.0 + 1e-9, "seed {seed}: {predicted} dB above the largest, {image:?}");
+}
+
+/// Within 0.5 dB; `HYBANK_TRIALS=30` tries thirty systems.
+#[test]
+fn predictions_agree_with_virtual_converters() {
+    trials::trials(3).for_each(check_prediction);
 }

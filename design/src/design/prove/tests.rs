@@ -8,7 +8,7 @@ use front_ends::{alike, bank, cases, family, thesis_filter};
 use hybank_core::bank::{Certificate, Gamma, StateMatrices, SynthesisFilters};
 use hybank_core::spec::{DesignSpec, Family, Method};
 use hybank_linalg::CMat;
-use hybank_verify::verify::{Verified, VerifyError, verify};
+use hybank_verify::verify::{Midpoint, Verified, VerifyError, verify};
 use std::f64::consts::TAU;
 
 #[path = "../../../../tests/support/front_ends.rs"]
@@ -139,7 +139,7 @@ fn an_unstable_bank_has_no_certificate() {
     let unstable = StateMatrices { a: grown, ..block.clone() };
     let bank = Bank { filters: SynthesisFilters::StateSpace(unstable), gamma: Gamma::default(), ..bank };
     assert!(matches!(verify(&bank), Err(VerifyError::NotProven { .. })));
-    assert!(prove(&bank).is_err());
+    assert!(crate::design::prove(&bank).is_err());
 }
 
 #[test]

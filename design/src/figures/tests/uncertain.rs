@@ -48,13 +48,8 @@ impl Case {
         let channel = &mut problem.channels[1];
         channel.delay = channel.delay.moved_by(FastPeriods(deviation(self.errors.delay, 0)));
         channel.gain *= 1.0 + deviation(self.errors.gain, 1);
-        let tone = |&bin: &usize| SourceTone {
-            omega: RadiansPerFastPeriod(TAU * bin as f64 / (2 * FRAMES) as f64),
-            amplitude: 1.0,
-            phase: TAU * random.part(),
-        };
-        let signal = Analog::Known(Source::Tones(bins.iter().map(tone).collect()));
-        let mut captured = capture(&problem, &signal, FRAMES + SETTLED);
+        let tones = drawn(bins, 2 * FRAMES, random);
+        let mut captured = captured(&problem, &tones, FRAMES + SETTLED);
         let target = captured.target.split_off(2 * SETTLED);
         let full_scale = (power(target.iter().copied()) / target.len() as f64).sqrt() / RMS;
         for (channel, bit) in captured.channels.iter_mut().zip(2..) {
