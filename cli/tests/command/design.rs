@@ -74,7 +74,7 @@ fn figures_in_the_terms_of_the_user_are_reported() {
         line.contains("against channel 1 alone at best") && line.contains(": this bank does not pay;"),
         "{out}"
     );
-    assert!(out.lines().count() == 7 && out.contains("uncertain delays"), "{out}");
+    assert!(out.lines().count() == 8 && out.contains("uncertain delays"), "{out}");
 }
 
 #[test]
