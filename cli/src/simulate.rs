@@ -37,9 +37,7 @@ Sources:
 
 Examples:
   hybank simulate spec.toml --source step@0.3 -o captures
-  hybank simulate bank.json --source speech.wav -o captures
   hybank simulate bank.json --source tones:440Hz,1kHz --samples 96000 -o captures
-  hybank simulate spec.toml --source music.wav --channel 2 -o captures
   hybank simulate spec.toml --source tones:440Hz -o captures --bits 12 --delay-error 10ns,-10ns
   hybank simulate spec.toml --source ctones:100kHz,-250kHz -o captures --to raw
   hybank simulate spec.toml --source i.wav --imaginary q.wav -o captures")]
