@@ -58,8 +58,8 @@ fn parts(snr: &Snr) -> Option<Fact> {
     ];
     let beside: Vec<String> =
         beside.into_iter().filter_map(|(part, db)| Some(format!("{part} {}", ratio(db?)))).collect();
-    let value = || format!("signal {}, {}", ratio(snr.signal_db), beside.join(", "));
-    (!beside.is_empty()).then(|| fact("parts", value(), "(each alone)"))
+    let parts = || format!("signal {}, {} (each alone)", ratio(snr.signal_db), beside.join(", "));
+    (!beside.is_empty()).then(|| fact("parts", "", parts()))
 }
 
 /// The signal-to-noise ratio and the largest image.
@@ -204,7 +204,7 @@ impl FigureTerms<'_> {
         let bits = snr_16_bits_db.map_or("", |_| "; all with 16-bit converters");
         let compared = fact("compared", signed(gain), self.verdict(best, gain) + bits);
         let others: Vec<String> = others.iter().map(with_ratios).collect();
-        let others = (!others.is_empty()).then(|| fact("others", others.join(", "), ""));
+        let others = (!others.is_empty()).then(|| fact("others", "", others.join(", ")));
         std::iter::once(compared).chain(others).collect()
     }
 
@@ -297,7 +297,7 @@ mod tests {
     fn an_snr_of_several_parts_names_them() {
         let snr = Snr { bits_db: Some(Decibels(72.04)), delays_db: Some(Decibels(80.0)), ..snr(98.0) };
         let all = lines(&Figures { snr, ..figures(98.0, 48.0) });
-        let want = "parts: signal 98.0 dB, bits 72.0 dB, uncertain delays 80.0 dB, (each alone)";
+        let want = "parts: , signal 98.0 dB, bits 72.0 dB, uncertain delays 80.0 dB (each alone)";
         assert_eq!((all.len(), &*all[1]), (6, want));
     }
 
@@ -319,7 +319,7 @@ mod tests {
                 "SFDR: 98.8 dB, to the largest image of a tone in 0 to 9 kHz, at 8.5 kHz",
                 "gain error: none, below the rounding of double precision in 0 to 9 kHz",
                 "compared: +41.0 dB, over a cubic spline (48.0 dB, SFDR 45.0 dB); all with 16-bit converters",
-                "others: channel 2 alone at best (20.0 dB), ",
+                "others: , channel 2 alone at best (20.0 dB)",
             ]
         );
     }
@@ -379,7 +379,7 @@ mod tests {
                 "compared: -2.0 dB, against channel 2 alone at best (70.3 dB): this bank does not pay; ";
             let bits = if noise_is_stated { "" } else { "; all with 16-bit converters" };
             assert_eq!(compared(&figures), format!("{start}{advice}{bits}"));
-            assert_eq!(lines(&figures).pop().unwrap(), "others: a cubic spline (40.0 dB, SFDR 45.0 dB), ");
+            assert_eq!(lines(&figures).pop().unwrap(), "others: , a cubic spline (40.0 dB, SFDR 45.0 dB)");
         }
         let mut figures = figures(42.7, 48.0);
         figures.setup.is_recursive = true;
