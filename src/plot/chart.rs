@@ -231,15 +231,18 @@ impl Chart {
         Ok(())
     }
 
+    /// Each line begins at its text, at the left of which only shorter lines are: texts cross no line.
     fn draw_guides<B: DrawingBackend, X: Across>(&self, chart: &mut Axes<'_, B, X>) -> DrawnSeries<B> {
         let (across, up) = (chart.x_range(), chart.y_range());
-        let left = chart.plotting_area().get_pixel_range().0.start;
-        let drawn = self.guides.iter().filter(|guide| across.contains(&guide.x));
-        for (row, Guide { label, x }) in drawn.enumerate() {
-            let (foot, dash) = ((*x, up.start), 4 * OVERSIZE);
+        let (columns, rows) = chart.plotting_area().get_pixel_range();
+        let step = (up.end - up.start) * f64::from(MARK_FONT * OVERSIZE) / f64::from(rows.end - rows.start);
+        let mut drawn: Vec<_> = self.guides.iter().filter(|guide| across.contains(&guide.x)).collect();
+        drawn.sort_by(|a, b| b.x.total_cmp(&a.x));
+        for (row, Guide { label, x }) in drawn.into_iter().enumerate() {
+            let (foot, dash) = ((*x, up.start + step * row as f64), 4 * OVERSIZE);
             let line = [foot, (*x, up.end)];
             chart.draw_series(DashedLineSeries::new(line, dash, dash, GUIDE.stroke_width(OVERSIZE)))?;
-            let (place, anchor) = beside_guide(chart.backend_coord(&foot).0 - left, row, label);
+            let (place, anchor) = beside_guide(chart.backend_coord(&foot).0 - columns.start, label);
             let style = TextStyle::from(text(MARK_FONT)).color(&GUIDE).pos(anchor);
             chart.draw_series([EmptyElement::at(foot) + Text::new(label.clone(), place, style)])?;
         }

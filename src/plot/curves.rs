@@ -47,7 +47,7 @@ impl Curves {
     pub(super) fn style(self, k: usize, count: usize) -> ShapeStyle {
         let above = count.saturating_sub(k + 1);
         match self {
-            Self::Overlaid if above == 0 => OVERLAID[0].stroke_width(OVERSIZE),
+            Self::Overlaid if above == 0 => OVERLAID[0].stroke_width(OVERSIZE + OVERSIZE / 4),
             Self::Overlaid => OVERLAID[above.min(OVERLAID.len() - 1)].stroke_width(2 * OVERSIZE),
             Self::Lines | Self::Stems => line_style(&COLOURS[k % COLOURS.len()]),
         }

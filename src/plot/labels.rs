@@ -15,12 +15,11 @@ const GAP: i32 = 2 * OVERSIZE as i32;
 type Pixel = (i32, i32);
 
 /// Where the text of an upright line is, relative to the foot of the line, which is so many pixels right of
-/// the frame: each in a row of its own, at the left where there is room.
-pub(super) fn beside_guide(from_left: i32, row: usize, text: &str) -> (Pixel, Pos) {
-    let down = -(GAP + row as i32 * (MARK_FONT * OVERSIZE) as i32);
+/// the frame: at the left where there is room.
+pub(super) fn beside_guide(from_left: i32, text: &str) -> (Pixel, Pos) {
     let at_left = from_left > width(text) + 2 * GAP;
     let (across, side) = if at_left { (-2 * GAP, HPos::Right) } else { (2 * GAP, HPos::Left) };
-    ((across, down), Pos::new(side, VPos::Bottom))
+    ((across, -GAP), Pos::new(side, VPos::Bottom))
 }
 
 /// Of a text, enlarged pixels.
