@@ -44,18 +44,13 @@ impl VisitMut for WithUnits {
 
 /// A number, or each of a list, as a text with this unit.
 fn give_unit(item: &mut Item, unit: &str) {
-    let text = |value: &Value| value.as_float().map(|number| Value::from(exact(number, unit)));
-    match item.as_value_mut() {
-        Some(Value::Array(list)) => list.iter_mut().for_each(|value| {
-            if let Some(text) = text(value) {
-                *value = text;
-            }
-        }),
-        Some(value) => {
-            if let Some(text) = text(value) {
-                *value = text;
-            }
+    let values: Vec<&mut Value> = match item.as_value_mut() {
+        Some(Value::Array(list)) => list.iter_mut().collect(),
+        value => value.into_iter().collect(),
+    };
+    for value in values {
+        if let Some(number) = value.as_float() {
+            *value = exact(number, unit).into();
         }
-        None => {}
     }
 }
