@@ -212,7 +212,7 @@ fn the_delays_over_time_are_followed() {
     let snr = |more: &[&str]| {
         let fuse = ["fuse", "bank.json", "cut/ch1.wav", "cut/ch2.wav", "-o", "y.wav", "--force"];
         desk.good(&[&fuse[..], more].concat());
-        number(&desk.report(&["measure", "y.wav", "--ref", "c/target.wav"]), "/snr_db")
+        number(&desk.report(&["measure", "y.wav", "--ref", "c/target.wav"]), "/reference/snr_db")
     };
     let (fixed, followed) = (snr(&[]), snr(&["--track", "cut/drift.jsonl"]));
     assert!(followed > fixed + 20.0, "{fixed} {followed}");
