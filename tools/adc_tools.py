@@ -3,7 +3,7 @@
 
     pip install adctoolbox==0.9.1 python-adc-eval==0.4.0
     python3 tools/adc_tools.py            # writes tests/numerics/adc_records/*.wav and figures.json
-    python3 tools/adc_tools.py HYBANK     # also runs this binary on them and prints the table of docs/measure.md
+    python3 tools/adc_tools.py HYBANK     # also runs this binary on them and prints their figures as a table
 
 Run from the repository root. Made with adctoolbox 0.9.1, python-adc-eval 0.4.0 and numpy 2.4.6.
 

@@ -14,7 +14,7 @@ use hybank::spec::{ErrorBox, ErrorPoint};
 use hybank::units::Seconds;
 use std::path::PathBuf;
 
-/// Computes the gamma of a bank, with the delays of its spec or with others
+/// Computes SNR, images and worst-case error of a bank, with the delays of its spec or with others
 ///
 /// gamma is the worst-case gain from the signal's source w to the error; without [signal] w is the analog
 /// input. The command builds the error system from

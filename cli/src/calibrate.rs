@@ -42,14 +42,9 @@ Examples:
   hybank calibrate spec.toml tone1.wav tone2.wav -o measured.toml --tone 1.2kHz
   hybank calibrate spec.toml tones1.wav tones2.wav -o measured.toml --tone 1kHz,5kHz,9kHz \\
       --fit delay,gain,offset,cutoff
-  hybank calibrate spec.toml adc.wav --interleaved 4 -o measured.toml --check other.wav
   hybank calibrate spec.toml z?.csv --interleaved 4 --full-scale 8bits -o measured.toml
   hybank calibrate spec.toml ch1.wav ch2.wav -o measured.toml --training chirp.wav
-  hybank calibrate spec.toml ch1.wav ch2.wav -o measured.toml --blind
-
-A tone may lie in any Nyquist zone of the slow rate. `auto` finds tones in the zone of the fast rate
-that holds the signal's band, or that the target passes, and takes their zones of the slow rate from
-the delays of the spec.")]
+  hybank calibrate spec.toml ch1.wav ch2.wav -o measured.toml --blind")]
 pub(super) struct Args {
     /// The spec (TOML) with the nominal values; `-` is standard input
     spec: PathBuf,
@@ -63,6 +58,10 @@ pub(super) struct Args {
     output: PathBuf,
     /// Frequencies of tones (Hz, kHz, MHz, GHz; hertz if left out) to about 100 ppm, or auto; of complex
     /// samples also negative
+    ///
+    /// A tone may lie in any Nyquist zone of the slow rate. `auto` finds tones in the zone of the fast rate
+    /// that holds the signal's band, or that the target passes, and takes their zones of the slow rate from
+    /// the delays of the spec.
     #[arg(long, value_name = "F,..|auto", value_delimiter = ',', value_parser = tone,
           conflicts_with_all = ["training", "blind"])]
     tone: Vec<ToneArg>,
@@ -76,17 +75,21 @@ pub(super) struct Args {
     /// or 1]
     #[arg(long, value_name = "I", hide_short_help = true)]
     reference: Option<usize>,
-    /// What to fit: delay, gain, offset, cutoff, or cutoff:2 for the cut-offs of the second stages of the
-    /// filters' cascades; the rest keeps the values of the spec [default: `fit` of the spec, or
-    /// delay,gain,offset]
+    /// What to fit: delay, gain, offset, cutoff [default: `fit` of the spec, or delay,gain,offset]
+    ///
+    /// cutoff:2 is for the cut-offs of the second stages of the filters' cascades. What is not fitted keeps
+    /// the values of the spec.
     #[arg(long, value_name = "VALUE,..", value_delimiter = ',')]
     fit: Vec<Fitting>,
-    /// Also find the static nonlinearity of each converter, a polynomial up to this order (2 to 32). It is
-    /// written where it lowers what the tones leave of samples that it was not fitted to
+    /// Also find the static nonlinearity of each converter, a polynomial up to this order (2 to 32)
+    ///
+    /// It is written where it lowers what the tones leave of samples that it was not fitted to.
     #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(2..=32),
           conflicts_with_all = ["training", "blind"])]
     nonlinearity: Option<u8>,
-    /// Captures of the same converters to check the calibrated spec with, of the same kind of signal
+    /// Other captures of the same converters to check the calibrated spec with
+    ///
+    /// They hold the same kind of signal.
     #[arg(long, value_name = "HOLDOUT", num_args = 1..)]
     check: Vec<PathBuf>,
     #[command(flatten)]

@@ -15,15 +15,15 @@ use std::path::Path;
 /// Options of the commands that read captures.
 #[derive(Debug, Clone, clap::Args)]
 pub(super) struct CaptureArgs {
-    /// Sample format of captures: wav, csv, or a raw format as in ffmpeg (s16le, f32le, ..; with c before it
-    /// for complex samples: cf32, cs16)
+    /// Sample format of captures: wav, csv, or a raw format as in ffmpeg (s16le, f32le, ..)
     ///
+    /// With c before it it is one of complex samples: cf32, cs16.
     /// SigMF recordings, .csv, .npy, .mat (x.mat:name for one variable of several) and .flac state their
     /// own; a text of numbers is a table, whatever its name.
     #[arg(long, value_name = "FORMAT", default_value = "wav", value_parser = coding)]
     format: Coding,
     /// Interleaved channels of each raw capture [default: 1 each, or all in a single capture]
-    #[arg(long, value_name = "C", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "C", value_parser = clap::value_parser!(u16).range(1..), hide_short_help = true)]
     channels: Option<u16>,
     /// Each pair of channels is a complex sample, as receivers write I and Q to WAV
     #[arg(long, hide_short_help = true)]
@@ -93,9 +93,11 @@ pub(super) fn check_channels(channels: Option<u16>, format: Coding) -> Result<()
 /// The full scale of captures.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub(super) struct ScaleArgs {
-    /// Full scale of the converters: the codes of 12bits from -2048 to 2047, of u12bits from 0 to 4095, in
-    /// words of any size, or a number (128, 2.5) [default: that of WAV and FLAC files, else that of the spec
-    /// or its bits, else all bits of integers, or 1]
+    /// Full scale of the converters: codes (12bits, u12bits) or a number [default: that of the file or spec]
+    ///
+    /// The codes of 12bits are from -2048 to 2047, those of u12bits from 0 to 4095, in words of any size. By
+    /// default it is that of WAV and FLAC files, else that of the spec or its bits, else all bits of
+    /// integers, or 1.
     #[arg(long, value_name = "X", value_parser = quantity::full_scale)]
     pub(super) full_scale: Option<FullScale>,
 }

@@ -167,17 +167,13 @@ impl Pictures<'_> {
             points: window.clone().map(|n| (time(n) * 1e3, contender.samples[n], String::new())).collect(),
         };
         let shown = self.contenders.first().into_iter().chain(self.contenders.last());
-        Chart {
-            title: "Around the step: chirp, tones and step through the converters".into(),
-            x_label: "time after the step, ms".into(),
-            y_label: "amplitude, 1 = full scale".into(),
-            series: vec![
-                curve("ideal fast converter", &self.captured.target),
-                curve("its response to the step alone", self.step),
-            ],
-            marks: shown.map(marks).collect(),
-            ..Chart::default()
-        }
+        let curves = vec![
+            curve("ideal fast converter", &self.captured.target),
+            curve("its response to the step alone", self.step),
+        ];
+        let title = "Around the step: chirp, tones and step through the converters";
+        let chart = Chart::lines(title, "time after the step, ms", "amplitude, 1 = full scale", curves);
+        Chart { marks: shown.map(marks).collect(), ..chart }
     }
 
     /// RMS error in decibels over intervals of 20 ms. The chirp sweeps with time, so time stands for
@@ -198,12 +194,8 @@ impl Pictures<'_> {
                 .map(|start| ((period * start as f64).0, level(&contender.samples, start)))
                 .collect(),
         };
-        Chart {
-            title: "Error while the chirp rises from 50 Hz to 13 kHz, step at 1 s".into(),
-            x_label: "time, s".into(),
-            y_label: "RMS error in 20 ms, dB of full scale".into(),
-            series: self.contenders.iter().map(curve).collect(),
-            ..Chart::default()
-        }
+        let title = "Error while the chirp rises from 50 Hz to 13 kHz, step at 1 s";
+        let curves = self.contenders.iter().map(curve).collect();
+        Chart::lines(title, "time, s", "RMS error in 20 ms, dB of full scale", curves)
     }
 }

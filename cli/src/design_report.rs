@@ -336,7 +336,8 @@ pub(super) fn against(gamma: f64, other: f64, what: &str) -> String {
 pub(super) fn figure_text(figures: &Figures, is_normalised: bool) -> String {
     let line = |Fact { name, value, meaning }: Fact| {
         let colon = if value == "none" { ":" } else { "" };
-        format!("{name:<10} {value}{colon} {meaning}\n")
+        let texts = [value + colon, meaning].into_iter().filter(|text| !text.is_empty());
+        format!("{name:<10} {}\n", texts.collect::<Vec<_>>().join(" "))
     };
     figure_facts(figures, is_normalised).into_iter().map(line).collect()
 }

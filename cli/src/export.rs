@@ -27,10 +27,8 @@ use std::path::{Path, PathBuf};
 Examples:
   hybank export bank.json --format c -o bank.h
   hybank export bank.json -o bank.mat
-  hybank export fixed.json -o taps.coe
-  hybank export fixed.json -o bank.h --input-bits 12
   hybank export fixed.json -o core.v --input-bits 12 --output-bits 14 --testbench test
-  hybank export fixed.json -o core.v --input-bits 12 --clocks-per-frame 8 --pipeline 2
+  hybank export fixed.json -o core.v --input-bits 12 --clocks-per-frame 8
   hybank export fixed.json -o core.v --input-bits 12 --loadable --testbench test
   hybank export other.json -o other.mem --input-bits 12 --loadable
   hybank export recursive.json --format sos -o sections.csv")]
@@ -93,31 +91,31 @@ const FORMATS: &[Choice<Format>] = &[
 #[command(next_help_heading = "Verilog")]
 struct VerilogArgs {
     /// Bits of the outputs, which saturate [default: those of the samples]
-    #[arg(long, value_name = "B", value_parser = clap::value_parser!(u32).range(2..=32))]
+    #[arg(long, value_name = "B", value_parser = clap::value_parser!(u32).range(2..=32), hide_short_help = true)]
     output_bits: Option<u32>,
     /// Bits of the accumulator; sums that do not fit wrap around [default: as many as no sum can leave]
-    #[arg(long, value_name = "B", value_parser = clap::value_parser!(u32).range(2..=64))]
+    #[arg(long, value_name = "B", value_parser = clap::value_parser!(u32).range(2..=64), hide_short_help = true)]
     accumulator: Option<u32>,
     /// Clocks between two frames: with C of them, each multiplier serves C taps [default: 1]
     #[arg(long, value_name = "C")]
     clocks_per_frame: Option<NonZeroU32>,
     /// Frames that a clock takes: sample x(i + N r) and output y(p + M r) belong to the frame r of the clock
     /// [default: 1]
-    #[arg(long, value_name = "P")]
+    #[arg(long, value_name = "P", hide_short_help = true)]
     frames_per_clock: Option<NonZeroU32>,
     /// Taps and offsets are written through a port, so that one synthesis serves every bank of this size;
     /// with --format mem the words of such a port
     #[arg(long)]
     loadable: bool,
     /// Levels of adders between two registers [default: 1]
-    #[arg(long, value_name = "LEVELS")]
+    #[arg(long, value_name = "LEVELS", hide_short_help = true)]
     pipeline: Option<NonZeroU32>,
     /// Write a self-checking testbench into this folder too, with its frames and the outputs of the
     /// bit-true model
     #[arg(long, value_name = "DIR")]
     testbench: Option<PathBuf>,
     /// Random frames of the testbench, after those of the worst signs [default: 1000]
-    #[arg(long, value_name = "FRAMES", requires = "testbench")]
+    #[arg(long, value_name = "FRAMES", requires = "testbench", hide_short_help = true)]
     random_frames: Option<u32>,
 }
 

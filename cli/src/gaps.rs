@@ -18,8 +18,9 @@ const REPORTED: usize = 10;
 /// Options of the commands that can estimate missing samples.
 #[derive(Debug, clap::Args)]
 pub(super) struct GapArgs {
-    /// Estimate missing samples from all those around them, and report them. They are NaN, jumps of SigMF
-    /// `core:global_index`, or in the file of --lost. The bank needs its spec
+    /// Estimate missing samples from all those around them, and report them
+    ///
+    /// They are NaN, jumps of SigMF `core:global_index`, or in the file of --lost. The bank needs its spec.
     #[arg(long)]
     gaps: bool,
     /// Write one byte per output sample: 0 where no missing sample affects it, else its predicted SNR in

@@ -269,16 +269,19 @@ impl MergeReport {
             readable(*samples as f64 / rate, "s"),
             Quoted(&self.recordings[0].name)
         );
-        text.push_str("  recording            began (s)      drift (ppm)               gain                      noise (dBFS)  alone (dB)\n");
-        for one in &self.recordings {
+        let names: Vec<String> = self.recordings.iter().map(|one| Quoted(&one.name).to_string()).collect();
+        let width = names.iter().map(|name| name.chars().count()).fold("recording".len(), usize::max);
+        let _ = writeln!(
+            text,
+            "  {:<width$}  began (s)      drift (ppm)               gain                      noise (dBFS)  alone (dB)",
+            "recording"
+        );
+        for (one, name) in self.recordings.iter().zip(&names) {
             let [drift, gain] = [one.drift_ppm, one.gain].map(|cell| cell.map_or_else(|| "-".into(), shown));
             let _ = writeln!(
                 text,
-                "  {:<20} {:<14.6} {drift:<25} {gain:<25} {:<13.1} {:.1}",
-                Quoted(&one.name),
-                one.start_seconds,
-                one.noise_dbfs,
-                one.alone_db
+                "  {name:<width$}  {:<14.6} {drift:<25} {gain:<25} {:<13.1} {:.1}",
+                one.start_seconds, one.noise_dbfs, one.alone_db
             );
             for StepReport { sample, lost } in &one.steps {
                 let what = if *lost < 0 { "too many" } else { "lost" };

@@ -136,12 +136,5 @@ fn chart(title: &str, x_label: &str, points: Vec<(f64, f64)>, bank: &Bank) -> Ch
     let level = |gamma| points.iter().map(|(x, _)| (*x, gamma)).collect();
     let level = own.map(|gamma| Series { label: "this bank".into(), points: level(gamma) });
     let best = Series { label: "the best of each".into(), points };
-    let series = std::iter::once(best).chain(level).collect();
-    Chart {
-        title: title.into(),
-        x_label: x_label.into(),
-        y_label: "gamma, dB (h = 1)".into(),
-        series,
-        ..Chart::default()
-    }
+    Chart::lines(title, x_label, "gamma, dB (h = 1)", std::iter::once(best).chain(level).collect())
 }

@@ -28,8 +28,7 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Sources:
   step@0.3                  0 before 0.3 s, 1 afterwards (units: s, ms, us, ns; s if left out)
-  tones:0.3,0.8             cosines of amplitude 1, angular frequencies in rad/s
-  tones:440Hz,1kHz          the same, frequencies in hertz
+  tones:440Hz,1kHz          cosines of amplitude 1; without units angular frequencies in rad/s
   chirp:50Hz..8kHz@2s       a linear sweep from 50 Hz to 8 kHz in 2 s
   ctones:100kHz,-250kHz     complex exponentials of amplitude 1, also of negative frequencies
   step@1+tones:440Hz        a sum
@@ -37,9 +36,7 @@ Sources:
 
 Examples:
   hybank simulate spec.toml --source step@0.3 -o captures
-  hybank simulate bank.json --source speech.wav -o captures
   hybank simulate bank.json --source tones:440Hz,1kHz --samples 96000 -o captures
-  hybank simulate spec.toml --source music.wav --channel 2 -o captures
   hybank simulate spec.toml --source tones:440Hz -o captures --bits 12 --delay-error 10ns,-10ns
   hybank simulate spec.toml --source ctones:100kHz,-250kHz -o captures --to raw
   hybank simulate spec.toml --source i.wav --imaginary q.wav -o captures")]

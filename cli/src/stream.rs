@@ -23,15 +23,10 @@ use std::path::PathBuf;
 /// The output is causal: it is delayed by the latency of the bank, and nothing is dropped.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
-Sample formats, as in ffmpeg:
-  s8 u8 s16le s16be s24le s24be s32le s32be f32le f32be f64le f64be, wav, and csv for inputs; cf32, cs16, cu8, .. are complex
-
 Examples:
   capture | hybank stream bank.json --format s16le > fast.raw
   hybank stream bank.json --input ch1.fifo --input ch2.fifo --format f32le | analyse
-  hybank stream quad.json --input left.raw --input right.raw --channels 2 --format s16le -o fast.wav
   hybank stream bank.json --input ch1.sigmf-meta --input ch2.sigmf-meta -o fast.sigmf-meta
-  capture | hybank stream bank.json --format s16le --interleaved 4 > fast.raw
   receive | hybank stream bank.json --format cs16 --output-format cf32 > fast.iq
   sox both.flac -t wav - | hybank stream bank.json --format wav | play -t wav -
 
@@ -39,7 +34,10 @@ An interrupt (Ctrl-C) ends the stream after whole frames; a second one ends it a
 pub(super) struct Args {
     /// The bank (JSON), as `hybank design` writes it
     bank: PathBuf,
-    /// Sample format of the input; with c before it for complex samples
+    /// Sample format of the input, as in ffmpeg (s16le, f32le, ..), wav or csv
+    ///
+    /// s8 u8 s16le s16be s24le s24be s32le s32be f32le f32be f64le f64be, also unsigned ones; with c before
+    /// it for complex samples: cf32, cs16, cu8.
     #[arg(long, value_name = "FORMAT", default_value = "f32le", value_parser = coding)]
     format: Coding,
     /// Sample format of the output [default: wav for the name x.wav, else that of the input; f32le for
@@ -51,17 +49,19 @@ pub(super) struct Args {
     #[command(flatten)]
     table: TableArgs,
     /// Interleaved channels of each raw input [default: 1 each, or all in a single input]
-    #[arg(long, value_name = "C", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "C", value_parser = clap::value_parser!(u16).range(1..), hide_short_help = true)]
     channels: Option<u16>,
-    /// A FIFO or file. Give the option once per channel, or once for an input that holds all channels. A
-    /// SigMF recording (a name that ends in sigmf-meta) states its own format and channels
+    /// A FIFO or file: once per channel, or once for an input that holds all channels
+    ///
+    /// A SigMF recording (a name that ends in sigmf-meta) states its own format and channels.
     #[arg(long, value_name = "FILE")]
     input: Vec<PathBuf>,
     /// What is given as in `fuse`, without the option.
     #[arg(hide = true)]
     names: Vec<PathBuf>,
-    /// The output file, which appears when it is complete (a SigMF recording if its name ends in
-    /// sigmf-meta), or a FIFO; `-` is standard output
+    /// The output, a file or a FIFO; `-` is standard output
+    ///
+    /// A file appears when it is complete. It is a SigMF recording if its name ends in sigmf-meta.
     #[arg(short, long, default_value = "-")]
     output: PathBuf,
     /// Output the last samples at the end, as many as the latency, with zeros for input

@@ -15,10 +15,10 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 Examples:
   hybank init -o spec.toml
-  hybank init --example audio-2x -o spec.toml")]
+  hybank init --example ti-adc -o spec.toml")]
 pub(super) struct InitArgs {
     /// What the spec describes
-    #[arg(long, value_enum, default_value_t = Example::TiAdc)]
+    #[arg(long, value_enum, default_value_t = Example::Audio2x)]
     example: Example,
     /// The spec (TOML); `-` is standard output
     #[arg(short, long, default_value = "-")]
@@ -30,11 +30,11 @@ pub(super) struct InitArgs {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Example {
-    /// Four time-interleaved converters with a few picoseconds of skew
-    TiAdc,
-    /// Two audio recorders, one a fraction of a sample late
+    /// Two audio converters of 24 kHz, one a fraction of a sample late, into 48 kHz
     #[value(name = "audio-2x")]
     Audio2x,
+    /// Four time-interleaved converters with a few picoseconds of skew
+    TiAdc,
     /// Fewer slow sensor samples than output samples
     SensorArray,
     /// Two inertial sensors with rates of their own, 100 Hz and 60 Hz, into 300 Hz

@@ -9,7 +9,7 @@ use hybank::messages::Quoted;
 use hybank::verify::{Verified, verify};
 use std::path::PathBuf;
 
-/// Proves the gamma in a bank file, from the file alone
+/// Proves the worst-case error of a bank, from its file alone
 ///
 /// Rebuilds the error system from the spec and the coefficients in the file. It uses nothing of the design,
 /// its solvers or its norms, and bounds every rounding error. It proves that gamma is at most gamma.upper,

@@ -19,7 +19,7 @@ pub(super) struct ErrorArgs {
     pub(super) bits: Option<u32>,
     /// Aperture jitter: each sample is taken this much off its instant, rms, as 2ps or 0.01samples [default:
     /// 0]
-    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = quantity::time)]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = quantity::time, hide_short_help = true)]
     jitter: Option<WrittenTime>,
     /// By how many parts per million the clocks are too fast, one value for all or one per channel
     #[arg(long, value_name = "PPM,..", value_delimiter = ',', allow_hyphen_values = true)]

@@ -228,18 +228,24 @@ pub fn scale_of(most: f64, unit: &str) -> (f64, String) {
 
 /// A value with an SI prefix and its unit, in at most six digits, for people: `250 MHz`.
 pub fn readable(value: f64, unit: &str) -> String {
-    let scientific = format!("{value:.5e}");
+    exact(format!("{value:.5e}").parse().unwrap_or(value), unit)
+}
+
+/// A value with an SI prefix and its unit, in as many digits as read back to the same bits.
+pub fn exact(value: f64, unit: &str) -> String {
+    let scientific = format!("{value:e}");
     let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
     let exponent: i32 = exponent.parse().unwrap_or(0);
     let power = 3 * exponent.div_euclid(3);
-    let prefix = PREFIXES.iter().find(|(_, known)| *known == power);
-    let (Some((prefix, _)), Ok(mantissa)) = (prefix, mantissa.parse::<f64>()) else {
-        return format!("{} {unit}", scientific);
+    let Some((prefix, _)) = PREFIXES.iter().find(|(_, known)| *known == power) else {
+        return format!("{scientific} {unit}");
     };
-    let shift = exponent - power;
-    let digits = format!("{:.*}", (5 - shift) as usize, mantissa * 10f64.powi(shift));
-    let digits = digits.trim_end_matches('0').trim_end_matches('.');
-    format!("{digits} {prefix}{unit}")
+    let (whole, part) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let shift = (exponent - power) as usize;
+    let part = format!("{part:0<shift$}");
+    let (shifted, rest) = part.split_at(shift);
+    let point = if rest.is_empty() { "" } else { "." };
+    format!("{whole}{shifted}{point}{rest} {prefix}{unit}")
 }
 
 /// A share of something: per cent, parts per million, or a number without unit.

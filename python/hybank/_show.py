@@ -43,8 +43,14 @@ def _picture(bank, ax, name):
 
         raise HybankError(f"picture: {ascii(name)[:200]} is unknown; choose {', '.join(pictures)}")
     picture = pictures[name]
-    for label, x, y in picture["curves"]:
-        ax.plot(x, y, label=label)
+    for k, (label, x, y) in enumerate(picture["curves"]):
+        if picture["are_stems"]:
+            ax.stem(x, y, linefmt=f"C{k}-", markerfmt=f"C{k}.", basefmt=" ", label=label)
+        else:
+            ax.plot(x, y, label=label)
+    for label, x in picture["guides"]:
+        ax.axvline(x, linestyle=":", linewidth=1, color="gray")
+        ax.text(x, 0.02, label, transform=ax.get_xaxis_transform(), rotation=90, ha="right", fontsize="small")
     ax.set_xscale("log" if picture["is_logarithmic"] else "linear")
     ax.set_title(picture["title"])
     ax.set_xlabel(picture["x_label"])

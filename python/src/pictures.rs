@@ -5,7 +5,7 @@ use crate::bank::Bank;
 use crate::errors::{refused, warn};
 use hybank::bank;
 use hybank::overview::page::{CapturesOnPage, MOST_FRAMES, Page};
-use hybank::plot::{AxisScale, Chart};
+use hybank::plot::{AxisScale, Chart, Curves};
 use hybank::units::Hertz;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -32,6 +32,9 @@ fn curves<'py>(py: Python<'py>, chart: &Chart) -> PyResult<Bound<'py, PyDict>> {
     one.set_item("x_label", &chart.x_label)?;
     one.set_item("y_label", &chart.y_label)?;
     one.set_item("is_logarithmic", chart.x_scale == AxisScale::Decades)?;
+    one.set_item("are_stems", chart.curves == Curves::Stems)?;
+    let guides = chart.guides.iter().map(|guide| (guide.label.clone(), guide.x));
+    one.set_item("guides", guides.collect::<Vec<_>>())?;
     let curve = |series: &hybank::plot::Series| {
         let (x, y): (Vec<f64>, Vec<f64>) = series.points.iter().copied().unzip();
         (series.label.clone(), PyArray1::from_vec(py, x), PyArray1::from_vec(py, y))

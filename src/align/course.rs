@@ -173,7 +173,11 @@ impl<'a> Course<'a> {
         let added = self.spec.fast_period * raised as f64;
         let of = |(piece, centre): (usize, &f64)| {
             let frame = (centre.round() as u64).checked_sub(skips[self.reference] as u64)?;
+            let is_known = self.clocks.iter().any(|clock| clock.reading(piece).is_some());
             let delay = |(i, clock): (usize, &ClockCourse)| {
+                if i == self.reference {
+                    return is_known.then(|| (self.spec.channels[i].delay + added, Seconds(0.0)));
+                }
                 let reading = clock.reading(piece)?;
                 let sample = (frame + skips[i] as u64) as f64;
                 // The reading says the same of the frame as of its own sample, beside the course.

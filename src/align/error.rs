@@ -99,7 +99,7 @@ pub enum AlignWarning {
     /// A delay moves, and the taps are fixed.
     #[error(
         "the delay of channel {channel} moves by {:.3} fast periods while the recordings last, and the taps of a bank are \
-         fixed; align and fuse shorter pieces, each with a bank for its own delays",
+         fixed; let the taps follow the delays over time, or fuse shorter pieces, each with a bank of its own",
         moved.0
     )]
     FixedTaps {

@@ -52,7 +52,9 @@ pub enum Verdict {
     #[error("{}", explained(vouched(*.0)))]
     Explained(f64),
     /// The same, and the signal does not tell its delays.
-    #[error("the captures do not contradict the spec, but do not tell its delays, so no SNR is vouched for")]
+    #[error(
+        "the captures do not contradict the spec, but this signal does not show whether its delays are right"
+    )]
     DelaysUntold(f64),
     /// Aliases overlap, or the signal fits other starts as well.
     #[error("this signal does not tell whether the captures agree with the spec")]
@@ -87,7 +89,7 @@ fn explained(snr: f64) -> String {
             "the captures fit the spec only to an SNR of {snr:.0} dB: look at their starts, delays and gains, and at their noise"
         )
     } else {
-        format!("the captures agree with the spec, and vouch for an SNR of {snr:.0} dB")
+        format!("the captures agree with the spec; they show an SNR of at least {snr:.0} dB")
     }
 }
 

@@ -151,17 +151,19 @@ fn spurs_before_after(measured: &BeforeAfter) -> String {
 }
 
 const STYLE: &str = "
-:root { color-scheme: light; }
+:root { color-scheme: light dark; }
 body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 0 auto; padding: 1rem; }
 h1 { font-size: 1.5rem; margin: 0.5rem 0 0; } h2 { font-size: 1.15rem; margin: 2rem 0 0.5rem; }
 .understood { color: #555; margin-top: 0.25rem; }
-table { border-collapse: collapse; width: 100%; }
+table { border-collapse: collapse; width: 100%; margin-top: 0.75rem; }
 th, td { text-align: left; vertical-align: top; padding: 0.3rem 1rem 0.3rem 0; border-bottom: 1px solid #ddd; }
 td.value { font-variant-numeric: tabular-nums; white-space: nowrap; }
 figure { margin: 1.5rem 0; } figure div { overflow-x: auto; }
 figure svg { display: block; width: 100%; min-width: 42rem; height: auto; }
 figcaption { color: #555; }
 pre { background: #f5f5f5; padding: 0.8rem; overflow-x: auto; font-size: 0.85rem; }
+@media (prefers-color-scheme: dark) { body { background: #191919; color: #ddd; } pre { background: #2a2a2a; }
+  .understood, figcaption { color: #aaa; } th, td { border-color: #444; } }
 @media (max-width: 40rem) { .facts td, .facts th { display: block; border: 0; padding-right: 0; }
   .facts tr { display: block; border-bottom: 1px solid #ddd; padding: 0.4rem 0; } td.value { white-space: normal; } }
 ";

@@ -5,8 +5,9 @@ use crate::design::responses::{analysis_gains, fir_response, front_end_gains, im
 use crate::design::{self, DesignError, norm_at};
 use crate::figures::{ToneOutput, tone_curve};
 use crate::linalg::Complex;
-use crate::plot::{AxisScale, Chart, Series};
+use crate::plot::{AxisScale, Chart, Curves, Guide, Series};
 use crate::quantity::scale_of;
+use crate::spec::SignalSpec;
 use crate::spec::{ErrorPoint, FrameSample};
 use crate::units::{FastPeriods, Hertz};
 use std::f64::consts::TAU;
@@ -68,7 +69,7 @@ pub fn pictures(bank: &Bank) -> Result<Vec<Picture>, DesignError> {
         ),
         picture(
             "impulse-responses",
-            "What each synthesis filter gives for one sample; its phases are the polyphase filters.",
+            "What each synthesis filter gives for one sample: its taps, those of the channels side by side.",
             impulses(bank, &responses),
         ),
         picture(
@@ -158,12 +159,33 @@ fn of_target_and_channels(bank: &Bank, title: &str, frequencies: &[Hertz], all: 
             .collect(),
     };
     let count = 1 + bank.channel_count().min(MOST_CHANNELS - 1);
-    over_decades(title, x_label, (0..count).map(curve).collect())
+    over_decades(bank, title, (factor, x_label), (0..count).map(curve).collect())
 }
 
-/// Gains over decades of the frequency.
-fn over_decades(title: &str, x_label: String, series: Vec<Series>) -> Chart {
-    Chart { x_scale: AxisScale::Decades, ..Chart::lines(title, x_label, "gain, dB", series) }
+/// Gains over decades of the frequency, with what limits the signal.
+fn over_decades(bank: &Bank, title: &str, (factor, x_label): (f64, String), series: Vec<Series>) -> Chart {
+    let guides = limits(bank).into_iter().map(|(label, at)| Guide { label, x: at.0 * factor }).collect();
+    Chart { x_scale: AxisScale::Decades, guides, ..Chart::lines(title, x_label, "gain, dB", series) }
+}
+
+/// Half the rates, and the ends of the band.
+fn limits(bank: &Bank) -> Vec<(String, Hertz)> {
+    let slow = |samples: usize| Hertz(0.5 * samples as f64 / bank.slow_period().0);
+    let mut limits = vec![("half the output rate".to_owned(), nyquist(bank))];
+    for (i, &samples) in bank.samples.iter().enumerate() {
+        let is_new = !bank.samples[..i].contains(&samples) && samples != bank.ratio;
+        let of = if bank.samples.iter().all(|other| *other == samples) {
+            "a converter".to_owned()
+        } else {
+            channel(i)
+        };
+        limits.extend(is_new.then(|| (format!("half the rate of {of}"), slow(samples))));
+    }
+    let band = bank.spec.as_ref().and_then(|spec| spec.signal.as_ref()).and_then(SignalSpec::band);
+    let ends =
+        band.into_iter().flat_map(|band| [("begin of the band", band.low), ("end of the band", band.high)]);
+    limits.extend(ends.filter(|(_, end)| end.0 > 0.0).map(|(label, end)| (label.to_owned(), end)));
+    limits
 }
 
 /// One curve per channel of a function of its response and group delay.
@@ -195,7 +217,7 @@ fn gains(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
     let frequencies = decades(nyquist(bank));
     let (x_label, series) =
         by_frequency(bank, responses, &frequencies, |response, _| decibels(response.norm()));
-    over_decades("Gain of the synthesis filters", x_label, series)
+    over_decades(bank, "Gain of the synthesis filters", (axis(nyquist(bank)).0, x_label), series)
 }
 
 fn group_delays(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
@@ -234,7 +256,8 @@ fn impulses(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
         points: taps.iter().enumerate().map(|(n, tap)| (n as f64, *tap)).collect(),
     };
     let series = filter_names(bank).into_iter().zip(responses).take(MOST_CHANNELS).map(curve).collect();
-    Chart::lines("Impulse responses of the synthesis filters", "fast samples", "tap", series)
+    let chart = Chart::lines("Impulse responses of the synthesis filters", "fast samples", "tap", series);
+    Chart { curves: Curves::Stems, ..chart }
 }
 
 fn error(bank: &Bank) -> Result<Chart, DesignError> {

@@ -1,7 +1,7 @@
 //! The spectra of recordings, of measured ones with their spurs marked.
 
 use crate::measure::{Cause, Comparison, Measurement, RecordSpectrum, Settings, Spur, Window};
-use crate::plot::{Chart, Marks, Series};
+use crate::plot::{Chart, Curves, Marks, Series};
 use crate::quantity::scale_of;
 use crate::units::{Decibels, Hertz};
 
@@ -118,7 +118,8 @@ impl Scale {
 
     fn chart(&self, title: String, window: Window, series: Vec<Series>) -> Chart {
         let y_label = format!("dBFS (window: {:.2} bins of noise)", window.noise_bandwidth());
-        Chart::lines(title, format!("frequency ({})", self.unit), y_label, series)
+        let chart = Chart::lines(title, format!("frequency ({})", self.unit), y_label, series);
+        Chart { curves: Curves::Overlaid, ..chart }
     }
 
     fn level(&self, amplitude: f64) -> f64 {

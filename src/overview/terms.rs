@@ -25,6 +25,12 @@ pub(super) fn fact(name: &'static str, value: impl Into<String>, meaning: impl I
 
 const CUTOFFS: &str = "; uncertain cut-offs not counted";
 
+/// Where neither the bank nor the best usual way has an SNR better by this, their images decide.
+const NOTICED_GAIN: Decibels = Decibels(1.0);
+
+/// Images that are lower by this are worth a bank: a bit of a converter.
+const NOTICED_SFDR: Decibels = Decibels(6.0);
+
 /// Ratios above this are rounding errors of double precision.
 const EXACT: Decibels = Decibels(270.0);
 
@@ -36,9 +42,8 @@ pub fn figure_facts(figures: &Figures, is_normalised: bool) -> Vec<Fact> {
     let rest = [
         words.image(),
         words.tone("gain error", figures.gain_error, "largest error of gain and phase of a tone"),
-        words.comparison(),
     ];
-    std::iter::once(snr).chain(parts(&figures.snr)).chain(rest).collect()
+    std::iter::once(snr).chain(parts(&figures.snr)).chain(rest).chain(words.comparison()).collect()
 }
 
 /// What the SNR counts beside the error from the signal, each part by itself; nothing where that is all.
@@ -53,8 +58,8 @@ fn parts(snr: &Snr) -> Option<Fact> {
     ];
     let beside: Vec<String> =
         beside.into_iter().filter_map(|(part, db)| Some(format!("{part} {}", ratio(db?)))).collect();
-    let value = || format!("signal {}, {}", ratio(snr.signal_db), beside.join(", "));
-    (!beside.is_empty()).then(|| fact("parts", value(), "(each alone)"))
+    let parts = || format!("signal {}, {} (each alone)", ratio(snr.signal_db), beside.join(", "));
+    (!beside.is_empty()).then(|| fact("parts", "", parts()))
 }
 
 /// The signal-to-noise ratio and the largest image.
@@ -188,21 +193,37 @@ impl FigureTerms<'_> {
         )
     }
 
-    /// The bank beside the best usual way, and the other ways.
-    fn comparison(&self) -> Fact {
-        let Some((best, others)) = self.figures.usual_ways.split_first() else {
-            return fact("compared", "unknown", "");
+    /// The bank beside the best usual way, then the other ways.
+    fn comparison(&self) -> Vec<Fact> {
+        let Figures { usual_ways, snr_16_bits_db, .. } = self.figures;
+        let (Some((best, others)), Some(gain)) =
+            (usual_ways.split_first(), self.figures.gain_over_usual_ways())
+        else {
+            return vec![fact("compared", "unknown", "")];
         };
-        let Some(gain) = self.figures.gain_over_usual_ways() else { return fact("compared", "unknown", "") };
-        let verdict = if self.figures.is_worthwhile() {
-            format!("over {}", with_ratios(best))
-        } else {
-            format!("against {}: this bank does not pay; {}", with_ratios(best), self.advice(best))
-        };
-        let rest: Vec<String> = others.iter().map(with_ratios).collect();
-        let rest = if rest.is_empty() { String::new() } else { format!("; {}", rest.join(", ")) };
-        let bits = self.figures.snr_16_bits_db.map_or("", |_| "; all with 16-bit converters");
-        fact("compared", signed(gain), format!("{verdict}{rest}{bits}"))
+        let bits = snr_16_bits_db.map_or("", |_| "; all with 16-bit converters");
+        let compared = fact("compared", signed(gain), self.verdict(best, gain) + bits);
+        let others: Vec<String> = others.iter().map(with_ratios).collect();
+        let others = (!others.is_empty()).then(|| fact("others", "", others.join(", ")));
+        std::iter::once(compared).chain(others).collect()
+    }
+
+    fn verdict(&self, best: &UsualFigure, gain: Decibels) -> String {
+        let way = with_ratios(best);
+        if self.figures.is_worthwhile() {
+            return format!("over {way}");
+        }
+        match self.gain_of_sfdr(best) {
+            Some(more) if gain >= -NOTICED_GAIN && more >= NOTICED_SFDR => format!(
+                "against {way}: the noise decides the SNR, and the SFDR is better by {}",
+                rounded(more)
+            ),
+            _ => format!("against {way}: this bank does not pay; {}", self.advice(best)),
+        }
+    }
+
+    fn gain_of_sfdr(&self, best: &UsualFigure) -> Option<Decibels> {
+        Some(-self.figures.image?.db - best.sfdr_db?)
     }
 
     /// What to do where the bank does not pay.
@@ -276,13 +297,17 @@ mod tests {
     fn an_snr_of_several_parts_names_them() {
         let snr = Snr { bits_db: Some(Decibels(72.04)), delays_db: Some(Decibels(80.0)), ..snr(98.0) };
         let all = lines(&Figures { snr, ..figures(98.0, 48.0) });
-        let want = "parts: signal 98.0 dB, bits 72.0 dB, uncertain delays 80.0 dB, (each alone)";
-        assert_eq!((all.len(), &*all[1]), (5, want));
+        let want = "parts: , signal 98.0 dB, bits 72.0 dB, uncertain delays 80.0 dB (each alone)";
+        assert_eq!((all.len(), &*all[1]), (6, want));
     }
 
     fn lines(figures: &Figures) -> Vec<String> {
         let line = |Fact { name, value, meaning }: Fact| format!("{name}: {value}, {meaning}");
         figure_facts(figures, false).into_iter().map(line).collect()
+    }
+
+    fn compared(figures: &Figures) -> String {
+        lines(figures).into_iter().find(|line| line.starts_with("compared")).unwrap()
     }
 
     #[test]
@@ -293,8 +318,8 @@ mod tests {
                 "SNR: 132.9 dB, for white noise in 0 to 9 kHz; 89.0 dB with 16-bit converters",
                 "SFDR: 98.8 dB, to the largest image of a tone in 0 to 9 kHz, at 8.5 kHz",
                 "gain error: none, below the rounding of double precision in 0 to 9 kHz",
-                "compared: +41.0 dB, over a cubic spline (48.0 dB, SFDR 45.0 dB); channel 2 alone at best \
-                 (20.0 dB); all with 16-bit converters",
+                "compared: +41.0 dB, over a cubic spline (48.0 dB, SFDR 45.0 dB); all with 16-bit converters",
+                "others: , channel 2 alone at best (20.0 dB)",
             ]
         );
     }
@@ -307,16 +332,30 @@ mod tests {
             (80.0, 89.04, "-9.0 dB"),
             (47.98, 48.0, "0.0 dB"),
         ] {
-            let line = lines(&figures(own, best)).pop().unwrap();
+            let image = Some(ToneFigure { db: Decibels(-50.9), hertz: Hertz(8.5e3) });
+            let figures = Figures { image, ..figures(own, best) };
+            let line = compared(&figures);
             let verdict = format!(
                 "compared: {value}, against a cubic spline ({best:.1} dB, SFDR 45.0 dB): this bank does not pay;"
             );
             assert!(line.starts_with(&verdict), "{line}");
             assert!(line.contains(" use that, or give the bank more latency and taps;"), "{line}");
-            let unknown = Figures { any_input: None, ..figures(own, best) };
-            let line = lines(&unknown).pop().unwrap();
+            let line = compared(&Figures { any_input: None, ..figures });
             assert!(line.contains(" use that, or say in [signal] where the signal lies;"), "{line}");
         }
+    }
+
+    /// Noise may hide in the SNR what a bank gains in images, and no gain in images makes up for an SNR.
+    #[test]
+    fn a_bank_of_better_images_pays() {
+        let against = "against a cubic spline (48.0 dB, SFDR 45.0 dB): ";
+        let images =
+            "the noise decides the SNR, and the SFDR is better by 53.8 dB; all with 16-bit converters";
+        for (own, value) in [(48.9, "+0.9 dB"), (47.0, "-1.0 dB")] {
+            assert_eq!(compared(&figures(own, 48.0)), format!("compared: {value}, {against}{images}"));
+        }
+        let line = compared(&figures(46.9, 48.0));
+        assert!(line.starts_with(&format!("compared: -1.1 dB, {against}this bank does not pay")), "{line}");
     }
 
     /// One channel is better by 2 dB: with every method, and noise that is stated or not.
@@ -325,28 +364,26 @@ mod tests {
         let assumed = "with 16-bit converters (assumed) one channel with a filter of any length would do as well for \
                        this band; use that, or state the `noise` of the converters";
         for (method, is_recursive, noise_is_stated, advice) in [
-            (Method::Fir, false, false, format!("{assumed} and design with the method h2; ")),
-            (Method::H2, true, false, format!("{assumed}; ")),
-            (Method::Fir, false, true, "use that, or design with the method h2; ".to_owned()),
-            (Method::H2, true, true, "use that, or give the bank more latency; ".to_owned()),
-            (Method::H2, false, true, "use that, or give the bank more latency and taps; ".to_owned()),
+            (Method::Fir, false, false, format!("{assumed} and design with the method h2")),
+            (Method::H2, true, false, assumed.to_owned()),
+            (Method::Fir, false, true, "use that, or design with the method h2".to_owned()),
+            (Method::H2, true, true, "use that, or give the bank more latency".to_owned()),
+            (Method::H2, false, true, "use that, or give the bank more latency and taps".to_owned()),
         ] {
             let mut figures = figures(68.3, 40.0);
             figures.usual_ways.swap(0, 1);
             figures.usual_ways[0].snr_db = Decibels(70.3);
             figures.setup = Setup { method, is_recursive, ..figures.setup };
             figures.snr_16_bits_db = figures.snr_16_bits_db.filter(|_| !noise_is_stated);
-            let line = lines(&figures).pop().unwrap();
             let start =
                 "compared: -2.0 dB, against channel 2 alone at best (70.3 dB): this bank does not pay; ";
-            assert!(
-                line.starts_with(&format!("{start}{advice}a cubic spline (40.0 dB, SFDR 45.0 dB)")),
-                "{line}"
-            );
+            let bits = if noise_is_stated { "" } else { "; all with 16-bit converters" };
+            assert_eq!(compared(&figures), format!("{start}{advice}{bits}"));
+            assert_eq!(lines(&figures).pop().unwrap(), "others: , a cubic spline (40.0 dB, SFDR 45.0 dB)");
         }
         let mut figures = figures(42.7, 48.0);
         figures.setup.is_recursive = true;
-        let line = lines(&figures).pop().unwrap();
+        let line = compared(&figures);
         assert!(line.contains(" use that, or give the bank more latency;"), "{line}");
     }
 }

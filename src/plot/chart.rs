@@ -1,7 +1,8 @@
 //! Line charts, and their SVG text.
 
 use super::axis::{AxisScale, Labels, extent, widened};
-use super::labels::{MARK_FONT, RADIUS, Room};
+use super::curves::{Curves, Guide, colours_after, line_style};
+use super::labels::{MARK_FONT, RADIUS, Room, beside_guide};
 use super::legend::{Dashes, Legend, LegendEntry, Look, OVERSIZE, letters};
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::coord::types::RangedCoordf64;
@@ -16,16 +17,10 @@ const ENLARGED: (u32, u32) = (WIDTH * OVERSIZE, HEIGHT * OVERSIZE);
 const SIDE: u32 = 10;
 /// Curves that differ by less than this share of their values are drawn as level.
 const LEAST_SHARE: f64 = 1e-3;
-/// Curves nearer to each other than this share of the height look like one.
-const SAME_PLACE: f64 = 0.005;
-const COLOURS: [RGBColor; 6] = [
-    RGBColor(31, 119, 180),
-    RGBColor(214, 39, 40),
-    RGBColor(44, 160, 44),
-    RGBColor(148, 103, 189),
-    RGBColor(255, 127, 14),
-    RGBColor(80, 80, 80),
-];
+/// In a dark scheme colours are turned round but for their hues; white and black become soft.
+const DARK: &str =
+    "<style>@media(prefers-color-scheme:dark){svg{filter:invert(.9) hue-rotate(180deg)}}</style>";
+const GUIDE: RGBColor = RGBColor(120, 120, 120);
 
 /// One curve.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,8 +63,12 @@ pub struct Chart {
     pub x_scale: AxisScale,
     /// Text beside the y axis, with its unit.
     pub y_label: String,
+    /// What the curves are.
+    pub curves: Curves,
     /// The curves, drawn in this order.
     pub series: Vec<Series>,
+    /// Upright lines behind the curves; those outside of the x axis are left out.
+    pub guides: Vec<Guide>,
     /// Points over the curves, in the colours that follow theirs.
     pub marks: Vec<Marks>,
 }
@@ -126,8 +125,10 @@ impl Chart {
         if points().next().is_none() {
             return Err(PlotError::Empty { title: self.title.clone() });
         }
-        let (across, up) = (extent(points().map(|p| p.0)), extent(points().map(|p| p.1)));
+        let zero = (self.curves == Curves::Stems).then_some(0.0);
+        let (across, up) = (extent(points().map(|p| p.0)), extent(points().map(|p| p.1).chain(zero)));
         let across = match self.x_scale {
+            AxisScale::Linear if zero.is_some() => across.start - 0.5..across.end + 0.5,
             AxisScale::Linear => widened(&across, 0.0, 0.0),
             AxisScale::Decades if across.start == across.end => 0.5 * across.start..2.0 * across.end,
             AxisScale::Decades => across,
@@ -140,19 +141,21 @@ impl Chart {
     }
 
     fn looks(&self, height: f64) -> Vec<Look> {
-        let covered = |k: usize| {
-            self.series[..k].iter().filter(|earlier| covers(&self.series[k], earlier, height)).count()
-        };
-        (0..self.series.len()).map(|k| Look::Line(dashes_over(covered(k)))).collect()
+        let curves: Vec<&[_]> = self.series.iter().map(|series| series.points.as_slice()).collect();
+        self.curves.looks(&curves, height)
+    }
+
+    fn style(&self, k: usize) -> ShapeStyle {
+        self.curves.style(k, self.series.len())
     }
 
     fn entries<'a>(&'a self, looks: &'a [Look]) -> impl Iterator<Item = LegendEntry<'a>> {
-        let line = |((series, look), colour): ((&'a Series, &Look), &RGBColor)| LegendEntry {
+        let line = |(k, (series, look)): (usize, (&'a Series, &Look))| LegendEntry {
             label: &series.label,
             look: *look,
-            style: line_style(colour),
+            style: if *look == Look::Points { self.style(k).filled() } else { self.style(k) },
         };
-        let lines = self.series.iter().zip(looks).zip(COLOURS.iter().cycle()).map(line);
+        let lines = self.series.iter().zip(looks).enumerate().map(line);
         let marks = &self.marks;
         let is_first = |k: usize| !marks[..k].iter().any(|earlier| earlier.label == marks[k].label);
         let points = self.styled().enumerate().filter(move |(k, _)| is_first(*k));
@@ -165,7 +168,7 @@ impl Chart {
 
     /// The marks with the style of their circles.
     fn styled(&self) -> impl Iterator<Item = (&Marks, ShapeStyle)> {
-        self.marks.iter().zip(COLOURS.iter().cycle().skip(self.series.len())).map(|(marks, next)| {
+        self.marks.iter().zip(colours_after(self.series.len())).map(|(marks, next)| {
             let colour = marks.colour.map_or(*next, |[r, g, b]| RGBColor(r, g, b));
             (marks, if marks.are_rings { line_style(&colour) } else { colour.filled() })
         })
@@ -204,6 +207,7 @@ impl Chart {
         looks: &[Look],
     ) -> DrawnSeries<B> {
         self.draw_axes(&mut chart)?;
+        self.draw_guides(&mut chart)?;
         self.draw_lines(&mut chart, looks)?;
         self.draw_marks(&mut chart)
     }
@@ -227,19 +231,45 @@ impl Chart {
         Ok(())
     }
 
+    /// Each line begins at its text, at the left of which only shorter lines are: texts cross no line.
+    fn draw_guides<B: DrawingBackend, X: Across>(&self, chart: &mut Axes<'_, B, X>) -> DrawnSeries<B> {
+        let (across, up) = (chart.x_range(), chart.y_range());
+        let (columns, rows) = chart.plotting_area().get_pixel_range();
+        let step = (up.end - up.start) * f64::from(MARK_FONT * OVERSIZE) / f64::from(rows.end - rows.start);
+        let mut drawn: Vec<_> = self.guides.iter().filter(|guide| across.contains(&guide.x)).collect();
+        drawn.sort_by(|a, b| b.x.total_cmp(&a.x));
+        for (row, Guide { label, x }) in drawn.into_iter().enumerate() {
+            let (foot, dash) = ((*x, up.start + step * row as f64), 4 * OVERSIZE);
+            let line = [foot, (*x, up.end)];
+            chart.draw_series(DashedLineSeries::new(line, dash, dash, GUIDE.stroke_width(OVERSIZE)))?;
+            let (place, anchor) = beside_guide(chart.backend_coord(&foot).0 - columns.start, label);
+            let style = TextStyle::from(text(MARK_FONT)).color(&GUIDE).pos(anchor);
+            chart.draw_series([EmptyElement::at(foot) + Text::new(label.clone(), place, style)])?;
+        }
+        Ok(())
+    }
+
     fn draw_lines<B: DrawingBackend, X: Across>(
         &self,
         chart: &mut Axes<'_, B, X>,
         looks: &[Look],
     ) -> DrawnSeries<B> {
-        for ((series, look), colour) in self.series.iter().zip(looks).zip(COLOURS.iter().cycle()) {
+        for (k, (series, look)) in self.series.iter().zip(looks).enumerate() {
             let points = series.points.iter().copied().filter(|(x, y)| self.is_drawn(*x, *y));
-            let style = line_style(colour);
+            let style = self.style(k);
             match *look {
                 Look::Line(Some(Dashes { on, off })) => {
                     chart.draw_series(DashedLineSeries::new(points, on, off, style))?;
                 }
-                _ => drop(chart.draw_series(LineSeries::new(points, style))?),
+                Look::Line(None) => drop(chart.draw_series(LineSeries::new(points, style))?),
+                Look::Points => {
+                    let shift = self.curves.shift(k, self.series.len());
+                    let points: Vec<_> = points.map(|(x, y)| (x + shift, y)).collect();
+                    let stem = |&(x, y): &(f64, f64)| PathElement::new([(x, 0.0), (x, y)], style);
+                    chart.draw_series(points.iter().map(stem))?;
+                    let head = |&point: &(f64, f64)| Circle::new(point, RADIUS, style.filled());
+                    chart.draw_series(points.iter().map(head))?;
+                }
             }
         }
         Ok(())
@@ -278,27 +308,11 @@ fn text(size: u32) -> FontDesc<'static> {
     letters(size * OVERSIZE)
 }
 
-/// For a line over so many others that lie in the same place; each shows in the gaps of the next one.
-fn dashes_over(covered: usize) -> Option<Dashes> {
-    let covered = i32::try_from(covered).unwrap_or(i32::MAX);
-    let unit = OVERSIZE as i32;
-    (covered > 0).then(|| Dashes { on: (12 / covered).max(2) * unit, off: 10 * unit })
-}
-
-/// Whether most of a curve lies on an earlier one: one colour would hide the other.
-fn covers(series: &Series, earlier: &Series, height: f64) -> bool {
-    let both = series.points.iter().zip(&earlier.points).filter(|(a, b)| a.1.is_finite() && b.1.is_finite());
-    let near = both.clone().filter(|(a, b)| a.0 == b.0 && (a.1 - b.1).abs() < SAME_PLACE * height).count();
-    near > 0 && 2 * near >= both.count()
-}
-
-fn line_style(colour: &RGBColor) -> ShapeStyle {
-    colour.stroke_width(OVERSIZE + OVERSIZE / 2)
-}
-
+/// The picture in its own size, for light and dark schemes.
 fn scale_by_view_box(svg: &str) -> String {
     let large = format!("width=\"{}\" height=\"{}\"", ENLARGED.0, ENLARGED.1);
-    svg.replacen(&large, &format!("width=\"{WIDTH}\" height=\"{HEIGHT}\""), 1)
+    let svg = svg.replacen(&large, &format!("width=\"{WIDTH}\" height=\"{HEIGHT}\""), 1);
+    svg.replacen('>', &format!(">\n{DARK}"), 1)
 }
 
 #[cfg(test)]
@@ -383,6 +397,24 @@ mod tests {
         };
         assert!((0.02..0.04).contains(&height(1e-7)), "{}", height(1e-7));
         assert!((1.0..1.2).contains(&height(1.0)), "{}", height(1.0));
+    }
+
+    /// Each tap has a stem and a head, and the legend a head.
+    #[test]
+    fn stems_begin_at_zero() {
+        let chart = Chart { curves: Curves::Stems, ..chart(vec![(0.0, 1.0), (1.0, 2.0), (2.0, 1.5)]) };
+        let (across, up) = chart.ranges().unwrap();
+        assert!(up.contains(&0.0) && across == (-0.5..2.5), "{across:?} {up:?}");
+        let svg = chart.to_svg().unwrap();
+        assert_eq!((svg.matches("<circle").count(), svg.matches("stroke=\"#1F77B4\"").count()), (4, 3));
+    }
+
+    #[test]
+    fn guides_outside_of_the_axis_are_left_out() {
+        let guide = |label: &str, x| Guide { label: label.into(), x };
+        let guides = vec![guide("inside", 1.0), guide("outside", 3.0)];
+        let svg = Chart { guides, ..chart(vec![(0.0, 1.0), (2.0, 3.0)]) }.to_svg().unwrap();
+        assert!(svg.contains("inside") && !svg.contains("outside"));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Places for the texts of marks.
 
 use super::legend::{LETTER, OVERSIZE};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::ops::Range;
 
 /// Height of the texts, before enlargement.
@@ -12,6 +13,19 @@ const GAP: i32 = 2 * OVERSIZE as i32;
 
 /// A pixel.
 type Pixel = (i32, i32);
+
+/// Where the text of an upright line is, relative to the foot of the line, which is so many pixels right of
+/// the frame: at the left where there is room.
+pub(super) fn beside_guide(from_left: i32, text: &str) -> (Pixel, Pos) {
+    let at_left = from_left > width(text) + 2 * GAP;
+    let (across, side) = if at_left { (-2 * GAP, HPos::Right) } else { (2 * GAP, HPos::Left) };
+    ((across, -GAP), Pos::new(side, VPos::Bottom))
+}
+
+/// Of a text, enlarged pixels.
+fn width(text: &str) -> i32 {
+    (f64::from(MARK_FONT * OVERSIZE) * LETTER * text.chars().count() as f64).ceil() as i32
+}
 
 /// The pixels that are taken.
 pub(super) struct Room {
@@ -58,7 +72,7 @@ impl Room {
     /// A free place for a text beside a circle, relative to its centre, which is taken then.
     pub(super) fn beside(&mut self, (x, y): Pixel, text: &str) -> Option<Pixel> {
         let height = (MARK_FONT * OVERSIZE) as i32;
-        let width = (f64::from(height) * LETTER * text.chars().count() as f64).ceil() as i32;
+        let width = width(text);
         let away = RADIUS + GAP;
         // Texts above and below leave the rows beside the circle free.
         let clear = away.max(height / 2);

@@ -303,7 +303,7 @@ fn no_worst_case_of_a_robust_bank_is_exceeded() {
     campaign(ROBUST, "robust banks", uncertain);
 }
 
-/// The worst cases of the example of the thesis with both delays off, in docs/uncertainty.md: of the nominal
+/// The worst cases of the example of the thesis with both delays off, in docs/figures.md: of the nominal
 /// bank by the search, of the best bank by the judge's own taps.
 #[test]
 fn the_worst_cases_in_the_docs_are_true() {

@@ -198,6 +198,26 @@ fn a_spec_of_the_recordings_gives_their_bank() {
     desk.good(&[&args[..], &["--force"]].concat());
 }
 
+/// Taps that follow `drift.jsonl` are better than those of the bank, which stay.
+#[test]
+fn the_delays_over_time_are_followed() {
+    let desk = Desk::with_spec(include_str!("../../../examples/recorders/spec.toml"));
+    let source = "tones:294Hz,562Hz,904Hz,1320Hz,1810Hz,22374Hz,3012Hz,1763Hz,2549Hz,3409Hz,2382Hz,23390Hz";
+    let simulated = ["simulate", "spec.toml", "-o", "c", "--samples", "153600", "--gain", "0.01"];
+    desk.good(&[&simulated[..], &["--noise", "1e-5", "--drift", "0,3", "--source", source]].concat());
+    let within = ["--trim", "cut", "--within", "100ms"];
+    let align = ["align", "spec.toml", "c/ch1.wav", "c/ch2.wav", "-o", "aligned.toml"];
+    desk.report(&[&align[..], &within].concat());
+    desk.good(&["design", "aligned.toml", "-o", "bank.json", "--no-proof"]);
+    let snr = |more: &[&str]| {
+        let fuse = ["fuse", "bank.json", "cut/ch1.wav", "cut/ch2.wav", "-o", "y.wav", "--force"];
+        desk.good(&[&fuse[..], more].concat());
+        number(&desk.report(&["measure", "y.wav", "--ref", "c/target.wav"]), "/reference/snr_db")
+    };
+    let (fixed, followed) = (snr(&[]), snr(&["--track", "cut/drift.jsonl"]));
+    assert!(followed > fixed + 20.0, "{fixed} {followed}");
+}
+
 /// The frequency of a slow sweep moves as its delay would: without its error the drift was -64 ppm.
 #[test]
 fn a_slow_sweep_is_refused() {

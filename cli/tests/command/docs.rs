@@ -155,15 +155,29 @@ fn snippets_of_readme_and_docs_work() {
     }
 }
 
+/// The anchor that the site and the repository give to a heading.
+fn anchor(heading: &str) -> String {
+    let kept = |c: &char| c.is_alphanumeric() || "-_ ".contains(*c);
+    heading.to_lowercase().chars().filter(kept).map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
+fn has_anchor(page: &Path, wanted: &str) -> bool {
+    let text = fs::read_to_string(page).expect("a page");
+    let headings = text.lines().filter(|line| line.starts_with('#'));
+    headings.map(|line| anchor(line.trim_start_matches('#').trim())).any(|own| own == wanted)
+}
+
 #[test]
 fn links_between_the_pages_lead_somewhere() {
     for page in pages() {
         let text = fs::read_to_string(&page).expect("a page");
         let targets = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
         for target in targets.filter(|target| !target.contains("://")) {
-            let file = target.split('#').next().unwrap_or_default();
-            let path = page.parent().expect("a folder").join(file);
-            assert!(path.exists(), "{}: the link to {target} leads nowhere", page.display());
+            let (file, heading) = target.split_once('#').unwrap_or((target, ""));
+            let path =
+                if file.is_empty() { page.clone() } else { page.parent().expect("a folder").join(file) };
+            let is_there = path.exists() && (heading.is_empty() || has_anchor(&path, heading));
+            assert!(is_there, "{}: the link to {target} leads nowhere", page.display());
         }
     }
 }

@@ -105,7 +105,10 @@ fn a_bank_is_drawn_in_nine_pictures() {
         assert!(files.starts_with("pictures/tones.svg\n"), "{files}");
         for (name, words) in [
             ("tones", &["largest image", "error of gain and phase", "input frequency, kHz"][..]),
-            ("front-ends", &["target", "channel 2", "kHz"]),
+            (
+                "front-ends",
+                &["target", "channel 2", "kHz", "half the output rate", "half the rate of a converter"],
+            ),
             ("filters", &["channel 1", "channel 2", "dB"]),
             ("analysis", &["target", "channel 2", "kHz"]),
             ("phase", &["channel 1", "rad"]),

@@ -93,9 +93,23 @@ fn people_read_six_digits_and_a_prefix() {
         (-3.0062e-9, "-3.0062 nHz"),
         (0.0, "0 Hz"),
         (12.345_678, "12.3457 Hz"),
-        (1e30, "1.00000e30 Hz"),
+        (1e30, "1e30 Hz"),
     ] {
         assert_eq!(readable(value, "Hz"), text);
+    }
+}
+
+#[test]
+fn exact_texts_read_back_to_the_same_bits() {
+    assert_eq!(exact(3.006_2e-9, "s"), "3.0062 ns");
+    assert_eq!(exact(14_000.0, "Hz"), "14 kHz");
+    assert_eq!(exact(0.1 + 0.2, "s"), "300.00000000000004 ms");
+    for power in -320..300 {
+        for digits in [1.0, -9.0, 1.234_567_890_123_456_7, 4.9 / 3.0] {
+            let value = digits * 10f64.powi(power);
+            let read = frequency(&exact(value, "Hz")).unwrap();
+            assert_eq!(read.0.to_bits(), value.to_bits(), "{value:e}");
+        }
     }
 }
 

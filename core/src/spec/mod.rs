@@ -21,6 +21,7 @@ mod sizes;
 mod table;
 mod tables;
 mod uncertainty;
+mod with_units;
 mod word_lengths;
 
 pub use crate::messages::Location;
@@ -229,14 +230,15 @@ impl Spec {
         table.and_then(|FromTable(table)| table.spec(overrides, models)).map_err(|error| error.in_file(name))
     }
 
-    /// The spec as a TOML file that reads back equal.
+    /// The spec as a TOML file that reads back equal, with units where time is not normalised.
     ///
     /// # Errors
     /// As [`Spec::check`]; NaN and infinity in particular are refused.
     pub fn to_toml(&self) -> Result<String, SpecError> {
         self.check()?;
-        toml::to_string(self)
-            .map_err(|error| Refusal::new("", SpecProblem::Value { message: error.to_string() }))
+        let text = toml::to_string(self)
+            .map_err(|error| Refusal::new("", SpecProblem::Value { message: error.to_string() }))?;
+        Ok(if self.is_normalised() { text } else { with_units::with_units(&text, self.fast_period) })
     }
 
     /// Checks a spec, whether it was read or built in memory.

@@ -145,7 +145,7 @@ fn no_corner_is_worse_than_what_was_found() {
 
 /// What a robust design wins over the bank that takes the errors for zero, in per cent of its largest gain:
 /// a table, with HYBANK_SLOW set. Without it, one row of it, and few taps where there are more than two
-/// channels. docs/uncertainty.md has its ranges.
+/// channels. docs/design-guide.md has its ranges.
 #[test]
 fn robust_designs_reach_their_bound_and_win_what_the_table_says() {
     let filters = [
