@@ -44,12 +44,14 @@ mod fit;
 mod lags;
 mod model;
 mod order;
+mod reading;
 mod record;
 mod starts;
 #[cfg(test)]
 #[path = "tests/testbench.rs"]
 pub(crate) mod testbench;
 mod tones;
+mod track;
 mod warning;
 mod waveform;
 
@@ -60,8 +62,11 @@ pub use estimates::{Calibration, CalibrationTone, ChannelEstimate, applied};
 pub use fit::FittedValues;
 pub(crate) use lags::{Correlation, LagLine, interpolated, line, steadied, stretch};
 pub(crate) use model::ChannelModel;
+pub(crate) use reading::LevelCourses;
+pub use reading::{LevelChange, Reading};
 pub(crate) use record::longest_run;
 pub use record::{Acquisition, Record};
+pub use track::{ChannelChange, Track, track};
 pub use warning::CalibrationWarning;
 
 pub use crate::spec::{Cutoff, Fitting, UnknownFitting};
