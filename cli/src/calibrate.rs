@@ -17,6 +17,7 @@ use hybank::files::commit_all;
 use hybank::messages::Quoted;
 use hybank::pipeline::matching::{check_channels, check_rate};
 use hybank::quantity::{self, WrittenTime};
+use hybank::sine_fit::CurveKind;
 use hybank::spec::{DesignOverrides, DesignSpec, Method, Spec, leaves_the_design_open};
 use hybank::units::FastPeriods;
 use std::path::{Path, PathBuf};
@@ -84,11 +85,12 @@ pub(super) struct Args {
     /// delay,gain,offset]
     #[arg(long, value_name = "VALUE,..", value_delimiter = ',')]
     fit: Vec<Fitting>,
-    /// Also find the static nonlinearity of each converter, a polynomial up to this order (2 to 32). It is
-    /// written where it lowers what the tones leave of samples that it was not fitted to
-    #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(2..=32),
-          conflicts_with_all = ["training", "blind"])]
-    nonlinearity: Option<u8>,
+    /// Also find the static nonlinearity of each converter: a polynomial up to this order (2 to 32), or a
+    /// table with a value for each code, which follows the steps of converters by successive approximation
+    /// and of pipelines. It is written where it lowers what the tones leave of samples that it was not
+    /// fitted to
+    #[arg(long, value_name = "ORDER|table", value_parser = curve_kind, conflicts_with_all = ["training", "blind"])]
+    nonlinearity: Option<CurveKind>,
     /// Also follow how delays, gains and offsets change while the captures are taken, and write them to this
     /// file: lines of JSON for `fuse --track`. A tone beside the signal (--tone) or any signal (--blind)
     /// tells them; what stays is a constant
@@ -212,10 +214,13 @@ impl Args {
         let captures = self.read(&self.captures, spec, warnings)?;
         let found = calibrate_pooled(spec, &borrowed(&captures), &signal, settings);
         let found = found.map_err(|error| of_captures(&captures, error))?;
-        let (calibrated, more) = applied(spec, &found);
+        let (mut calibrated, more) = applied(spec, &found);
         let drift = self.track(&calibrated, &captures, &found, settings)?;
         // What changes fits no values, but each block fits its own.
-        let misfit = drift.as_ref().map_or(found.misfit, |drift| drift.misfit);
+        if let Some(drift) = &drift {
+            calibrated = applied(&calibrated, &drift.calibration).0;
+        }
+        let misfit = drift.as_ref().map_or(found.misfit, |drift| drift.calibration.misfit);
         self.check_misfit(&found, misfit, warnings)?;
         let mut report = CalibrationReport::new(spec, &found);
         report.add(&more);
@@ -227,7 +232,10 @@ impl Args {
                 CalibrationSignal::Tones(_) => CalibrationSignal::Tones(Vec::new()),
                 signal => signal,
             };
-            let fit = FittedValues { nonlinearity: None, ..settings.fit };
+            let values = FittedValues { nonlinearity: None, ..settings.fit };
+            // Delays and gains are compared; a cut-off takes more tones than they do.
+            let compared = FittedValues { cutoff: None, ..values };
+            let fit = if compared == FittedValues::NOTHING { values } else { compared };
             let settings = CalibrationSettings { fit, ..settings };
             let checked = calibrate_pooled(&calibrated, &borrowed(&captures), &held_out, settings)
                 .map_err(|error| Failure::Input(format!("the held-out captures: {error}")))?;
@@ -332,7 +340,7 @@ impl Args {
             .map_err(|error| bad_flag("fit", error.problem()))?;
         let given = if self.fit.is_empty() { &spec.fit } else { &self.fit };
         let fit = if given.is_empty() { FittedValues::default() } else { given.iter().copied().collect() };
-        let fit = FittedValues { nonlinearity: self.nonlinearity.map(usize::from), ..fit };
+        let fit = FittedValues { nonlinearity: self.nonlinearity, ..fit };
         let reference = reference(self.reference, spec)?;
         Ok(CalibrationSettings { fit, reference })
     }
@@ -355,6 +363,12 @@ impl Args {
         }
         tones(&self.tone).map(CalibrationSignal::Tones)
     }
+}
+
+fn curve_kind(text: &str) -> Result<CurveKind, String> {
+    let order = text.parse().ok().filter(|order| (2..=32).contains(order)).map(CurveKind::Order);
+    let kind = order.or_else(|| (text == "table").then_some(CurveKind::Table));
+    kind.ok_or_else(|| "give an order from 2 to 32, or table".to_owned())
 }
 
 /// The reference channel, from 0: the `given` one, from 1, or that of the spec.

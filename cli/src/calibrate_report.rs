@@ -5,6 +5,7 @@ use hybank::calibrate::{
     Calibration, CalibrationWarning, ChannelChange, ChannelEstimate, LevelChange, Track,
 };
 use hybank::messages::Quoted;
+use hybank::runtime::Nonlinearity;
 use hybank::sine_fit::Estimate;
 use hybank::spec::{HALF_WIDTH, Spec};
 use hybank::units::FastPeriods;
@@ -39,9 +40,9 @@ struct CalibratedChannel {
     /// Factor of the cut-off frequency.
     #[serde(skip_serializing_if = "Option::is_none")]
     cutoff: Option<Interval>,
-    /// a_2, a_3, .. of the static nonlinearity; absent if it was not fitted, empty where it does not help.
+    /// As in a spec; absent if it was not fitted, an empty list where it does not help.
     #[serde(skip_serializing_if = "Option::is_none")]
-    nonlinearity: Option<Vec<f64>>,
+    nonlinearity: Option<Nonlinearity>,
     /// Clipped samples, which were left out.
     clipped: usize,
 }
@@ -255,13 +256,8 @@ impl CalibrationReport {
             if let Some(cutoff) = channel.cutoff {
                 let _ = write!(text, "  cut-off x {}", shown(cutoff));
             }
-            match channel.nonlinearity.as_deref() {
-                Some([]) => text.push_str("  no nonlinearity that helps"),
-                Some(curve) => {
-                    let largest = curve.iter().fold(0.0, |most: f64, a| most.max(a.abs()));
-                    let _ = write!(text, "  nonlinearity of order {}, up to {largest:.1e}", curve.len() + 1);
-                }
-                None => {}
+            if let Some(curve) = &channel.nonlinearity {
+                text += &nonlinearity_text(curve);
             }
             text.push('\n');
         }
@@ -287,6 +283,20 @@ impl CalibrationReport {
             let _ = writeln!(text, "{}", Quoted(path));
         }
         text
+    }
+}
+
+fn nonlinearity_text(curve: &Nonlinearity) -> String {
+    let values = curve.values();
+    let largest = values.iter().fold(0.0, |most: f64, a| most.max(a.abs()));
+    match curve {
+        _ if curve.is_straight() => "  no nonlinearity that helps".to_owned(),
+        Nonlinearity::Polynomial(_) => {
+            format!("  nonlinearity of order {}, up to {largest:.1e}", values.len() + 1)
+        }
+        Nonlinearity::Table { .. } => {
+            format!("  nonlinearity of {} codes, up to {largest:.1e}", values.len())
+        }
     }
 }
 

@@ -256,10 +256,9 @@ fn alignment(
         warnings
             .extend(met.map(|(pair, at)| AlignWarning::Coincidence { channels: pair.map(|i| i + 1), at }));
     }
-    let piece = |estimate: &'_ PieceEstimate| -> (f64, &'_ [ChannelEstimate]) {
-        (estimate.centre - skips[reference] as f64, &estimate.channels)
-    };
-    let levels = LevelCourses::new(&spec, estimates.iter().map(piece));
+    let first = skips[reference] as f64;
+    let levels = estimates.iter().map(|one| (one.centre - first, one.channels.as_slice()));
+    let levels = LevelCourses::new(&spec, levels);
     let readings = course.readings(&skips, raised, &levels);
     let at: Vec<f64> = readings.iter().map(|reading| reading.frame as f64).collect();
     let changes = levels.changes(&at);

@@ -71,6 +71,7 @@ pub use warning::CalibrationWarning;
 
 pub use crate::spec::{Cutoff, Fitting, UnknownFitting};
 
+use crate::runtime::Nonlinearity;
 use crate::spec::{Spec, UncertaintySpec};
 use crate::units::{FastPeriods, Hertz};
 use estimates::Fitted;
@@ -163,7 +164,7 @@ pub fn calibrate_pooled(
         None => fit(spec, None)?,
         // The tones of samples as they are tell the curves, and those of straight samples the values.
         Some(_) => {
-            let bent = with_nonlinearity(spec, vec![Vec::new(); spec.channels.len()]);
+            let bent = with_nonlinearity(spec, vec![Nonlinearity::default(); spec.channels.len()]);
             let curves = fit(&bent, order)?.curves;
             Fitted { curves: curves.clone(), ..fit(&with_nonlinearity(spec, curves), None)? }
         }
@@ -209,7 +210,7 @@ pub fn calibrate_pooled(
 }
 
 /// `spec` with other nonlinearities.
-fn with_nonlinearity(spec: &Spec, curves: Vec<Vec<f64>>) -> Spec {
+fn with_nonlinearity(spec: &Spec, curves: Vec<Nonlinearity>) -> Spec {
     let mut new = spec.clone();
     new.channels.iter_mut().zip(curves).for_each(|(channel, curve)| channel.nonlinearity = curve);
     new

@@ -36,38 +36,33 @@ struct ReadingLine {
     frame: u64,
     delay: Vec<Option<f64>>,
     half_width: Vec<Option<f64>>,
-    #[serde(flatten)]
-    gain: Option<GainsOfLine>,
-    #[serde(flatten)]
-    offset: Option<OffsetsOfLine>,
-}
-
-#[derive(Serialize)]
-struct GainsOfLine {
-    gain: Vec<f64>,
-    gain_half_width: Vec<f64>,
-}
-
-#[derive(Serialize)]
-struct OffsetsOfLine {
-    offset: Vec<f64>,
-    offset_half_width: Vec<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gain: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gain_half_width: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    offset: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    offset_half_width: Option<Vec<f64>>,
 }
 
 impl Reading {
     /// The reading as a line of JSON.
     pub fn line(&self) -> String {
-        let delay = self.delays.iter().map(|known| known.map(|(delay, _)| delay.0)).collect();
-        let half_width =
-            self.delays.iter().map(|known| known.map(|(_, sigma)| sigma.0 * HALF_WIDTH)).collect();
-        let values = |all: &[Known]| all.iter().map(|known| known.value).collect();
-        let half_widths = |all: &[Known]| all.iter().map(|known| known.deviation * HALF_WIDTH).collect();
-        let gains = |all: &Vec<Known>| GainsOfLine { gain: values(all), gain_half_width: half_widths(all) };
-        let offsets =
-            |all: &Vec<Known>| OffsetsOfLine { offset: values(all), offset_half_width: half_widths(all) };
-        let (gain, offset) = (self.gains.as_ref().map(gains), self.offsets.as_ref().map(offsets));
-        serde_json::to_string(&ReadingLine { frame: self.frame, delay, half_width, gain, offset })
-            .unwrap_or_default()
+        let of_delays =
+            |part: fn((Seconds, Seconds)) -> f64| self.delays.iter().map(|known| known.map(part)).collect();
+        let values = |all: &Vec<Known>| all.iter().map(|known| known.value).collect();
+        let half_widths = |all: &Vec<Known>| all.iter().map(|known| known.deviation * HALF_WIDTH).collect();
+        let line = ReadingLine {
+            frame: self.frame,
+            delay: of_delays(|(delay, _)| delay.0),
+            half_width: of_delays(|(_, sigma)| sigma.0 * HALF_WIDTH),
+            gain: self.gains.as_ref().map(values),
+            gain_half_width: self.gains.as_ref().map(half_widths),
+            offset: self.offsets.as_ref().map(values),
+            offset_half_width: self.offsets.as_ref().map(half_widths),
+        };
+        serde_json::to_string(&line).unwrap_or_default()
     }
 }
 
@@ -87,6 +82,13 @@ pub(super) fn course(pieces: impl Iterator<Item = (f64, Estimate<f64>)>, nominal
 pub(super) fn extremes(course: &LearnedCourse, at: &[f64]) -> (f64, f64) {
     let values = || at.iter().map(|x| course.at(*x).value);
     (values().fold(f64::NEG_INFINITY, f64::max), values().fold(f64::INFINITY, f64::min))
+}
+
+/// The normal law whose 95 % interval holds the course and its intervals at some positions.
+pub(super) fn range(course: &LearnedCourse, at: &[f64]) -> Estimate<f64> {
+    let (most, least) = extremes(course, at);
+    let deviation = at.iter().map(|x| course.at(*x).deviation).fold(0.0, f64::max);
+    Estimate { value: 0.5 * (most + least), sigma: 0.5 * (most - least) / HALF_WIDTH + deviation }
 }
 
 /// The gains and offsets of all channels over time.
@@ -122,6 +124,11 @@ impl LevelCourses {
             let some_change = courses.iter().any(LearnedCourse::changes);
             some_change.then(|| courses.iter().map(|course| course.at(x)).collect())
         })
+    }
+
+    /// The gain and the offset of a channel, of which the intervals hold the courses at some positions.
+    pub(super) fn ranges(&self, channel: usize, at: &[f64]) -> [Estimate<f64>; 2] {
+        [range(&self.gains[channel], at), range(&self.offsets[channel], at)]
     }
 
     /// By how much those of each channel change between some positions.

@@ -2,7 +2,7 @@
 //! and smooth courses go through what they say.
 
 use super::estimates::{Calibration, ChannelEstimate};
-use super::reading::{LevelChange, LevelCourses, Reading, course, extremes};
+use super::reading::{LevelChange, LevelCourses, Reading, course, extremes, range};
 use super::record::Record;
 use super::{CalibrateError, CalibrationSettings, CalibrationSignal, FittedValues, calibrate};
 use crate::sampling::{Known, LearnedCourse, median};
@@ -30,8 +30,8 @@ pub struct Track {
     pub readings: Vec<Reading>,
     /// By how much each channel changes.
     pub changes: Vec<ChannelChange>,
-    /// The median of the misfits of the blocks, if there were any.
-    pub misfit: Option<f64>,
+    /// The middle of each course, with intervals that hold it, and the median of the misfits of the blocks.
+    pub calibration: Calibration,
 }
 
 /// By how much a converter changes; 0 where no change stands out of the noise.
@@ -87,7 +87,7 @@ pub fn track(
     let found: Vec<Block> = all.into_iter().flatten().collect();
     let measured = found.len();
     match reason {
-        Some(reason) if (measured as f64) < LEAST_SHARE * blocks as f64 => {
+        Some(reason) if measured == 0 || (measured as f64) < LEAST_SHARE * blocks as f64 => {
             Err(CalibrateError::BlocksNotMeasured { measured, blocks, reason: Box::new(reason) })
         }
         _ => Ok(Track { blocks, ..tracked(spec, &found, frames) }),
@@ -105,8 +105,8 @@ fn tracked(spec: &Spec, blocks: &[Block], frames: usize) -> Track {
         course(blocks.iter().filter_map(of), nominal[i].0)
     };
     let delays: Vec<LearnedCourse> = (0..nominal.len()).map(delay).collect();
-    let piece = |block: &'_ Block| -> (f64, &'_ [ChannelEstimate]) { (block.middle, &block.found.channels) };
-    let levels = LevelCourses::new(spec, blocks.iter().map(piece));
+    let pieces = blocks.iter().map(|block| (block.middle, block.found.channels.as_slice()));
+    let levels = LevelCourses::new(spec, pieces);
     let middles = blocks.iter().map(|block| block.middle.round());
     let at: Vec<f64> = std::iter::once(0.0).chain(middles).chain([frames as f64 - 1.0]).collect();
     let in_seconds = |Known { value, deviation }: Known| {
@@ -124,12 +124,30 @@ fn tracked(spec: &Spec, blocks: &[Block], frames: usize) -> Track {
     };
     let changes = delays.iter().zip(levels.changes(&at));
     let misfits: Vec<f64> = blocks.iter().filter_map(|block| block.found.misfit).collect();
+    let channel = |(i, course): (usize, &LearnedCourse)| {
+        let fitted = &blocks[0].found.channels[i];
+        let Estimate { value, sigma } = range(course, &at);
+        let delay = Estimate { value: FastPeriods(value), sigma: FastPeriods(sigma) };
+        let [gain, offset] = levels.ranges(i, &at);
+        ChannelEstimate {
+            delay: fitted.delay.map(|_| delay),
+            gain: fitted.gain.map(|_| gain),
+            offset: fitted.offset.map(|_| offset),
+            cutoff: None,
+        }
+    };
+    let calibration = Calibration {
+        reference: blocks[0].found.reference,
+        channels: delays.iter().enumerate().map(channel).collect(),
+        misfit: (!misfits.is_empty()).then(|| median(misfits)),
+        ..Calibration::default()
+    };
     Track {
         blocks: blocks.len(),
         measured: blocks.len(),
         readings: at.iter().map(reading).collect(),
         changes: changes.map(|(delay, levels)| ChannelChange { delay: moved(delay), levels }).collect(),
-        misfit: (!misfits.is_empty()).then(|| median(misfits)),
+        calibration,
     }
 }
 

@@ -3,7 +3,7 @@
 use super::CaptureError;
 use crate::bank::Bank;
 use crate::calibrate::LevelChange;
-use crate::runtime::nonlinearity;
+use crate::runtime::Nonlinearity;
 use crate::spec::{SpecProblem, check_gain, check_offset};
 use crate::units::Seconds;
 
@@ -43,10 +43,16 @@ impl LevelTrack {
         Ok(Self { bank: bank.clone(), times, gains, offsets })
     }
 
-    /// The bank for samples that have been [corrected](Self::correct).
+    /// The bank for samples that have been [corrected](Self::correct): how far its gains move is no
+    /// uncertainty of theirs.
     pub fn bank(&self) -> Bank {
         let channels = self.bank.channel_count();
-        Bank { nonlinearity: vec![Vec::new(); channels], offsets: vec![0.0; channels], ..self.bank.clone() }
+        let mut spec = self.bank.spec.clone();
+        if let Some(uncertainty) = spec.as_mut().and_then(|spec| spec.uncertainty.as_mut()) {
+            (uncertainty.gain, uncertainty.offset) = (None, None);
+        }
+        let nonlinearity = vec![Nonlinearity::default(); channels];
+        Bank { spec, nonlinearity, offsets: vec![0.0; channels], ..self.bank.clone() }
     }
 
     /// Takes nonlinearity and offset out of samples from frame `first` on, and gives them the gain of the
@@ -56,7 +62,7 @@ impl LevelTrack {
             let (curve, nominal) = (&self.bank.nonlinearity[i], self.bank.gains[i]);
             for (frame, x) in (first..).zip(samples) {
                 let time = self.bank.slow_period() * frame as f64;
-                let straight = *x - nonlinearity(curve, *x);
+                let straight = *x - curve.at(*x);
                 *x = (straight - self.at(time, &self.offsets[i])) * nominal / self.at(time, &self.gains[i]);
             }
         }
