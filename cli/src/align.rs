@@ -2,14 +2,14 @@
 
 use super::bank_file::{parse_spec, read_kind};
 use super::calibrate::reference;
-use super::calibrate_report::{Interval, interval, periods, shown};
+use super::calibrate_report::{Interval, interval, level_changes, periods, shown};
 use super::capture_args::{CaptureArgs, check_stdin};
 use super::capture_file::{start, unread};
 use super::file_kind::FileKind;
 use super::print::{Failure, check_json, failed, failed_at, is_dash, say_understood, show, warn};
 use super::written::{Mono, begin_file, begin_recording, check_together, write_text, write_together};
-use hybank::align::{AlignError, AlignSettings, AlignedChannel, Alignment, ClockStep, align};
-use hybank::calibrate::{CalibrateError, Record};
+use hybank::align::{AlignError, AlignSettings, Alignment, ClockStep, align};
+use hybank::calibrate::{CalibrateError, LevelChange, Record};
 use hybank::captures::{Captures, Converters};
 use hybank::figures::Alone;
 use hybank::io::{Container, PcmFormat, ReadOptions};
@@ -52,7 +52,7 @@ pub(super) struct Args {
     #[arg(short, long)]
     output: PathBuf,
     /// Write the recordings from their first common sample on into this folder: ch1.wav, ch2.wav, .., with
-    /// NaN for lost samples, and drift.jsonl, their delays over time as JSON lines
+    /// NaN for lost samples, and drift.jsonl, their delays over time, and gains and offsets that change
     #[arg(long, value_name = "DIR")]
     trim: Option<PathBuf>,
     /// How far apart the recordings began at most, as 50ms or 2s
@@ -237,40 +237,41 @@ struct ChannelAlignment {
     drift_ppm: Interval,
     gain: Interval,
     offset: Interval,
+    /// By how much gain and offset change; 0 where no change stands out of the noise.
+    changes: LevelChange,
     /// Where samples were lost or came in.
     steps: Vec<ClockStep>,
 }
 
 impl ChannelAlignment {
-    fn new(spec: &Spec, channel: usize, found: &AlignedChannel, steps: &[ClockStep]) -> Self {
+    fn new(spec: &Spec, i: usize, alignment: &Alignment) -> Self {
         let h = spec.fast_period;
+        let found = &alignment.channels[i];
         let Estimate { value, sigma } = found.delay;
         let delay = Estimate { value: value.in_fast_periods(h), sigma: sigma.in_fast_periods(h) };
         let drift = Estimate { value: 1e6 * found.drift.value, sigma: 1e6 * found.drift.sigma };
         Self {
-            channel,
+            channel: i + 1,
             skip: found.skip,
             delay_samples: periods(delay),
             drift_ppm: interval(drift),
             gain: interval(found.gain),
             offset: interval(found.offset),
-            steps: steps.to_vec(),
+            changes: alignment.changes[i],
+            steps: alignment.instants(i).steps().to_vec(),
         }
     }
 }
 
 impl AlignReport {
     fn new(spec: &Spec, found: &Alignment, alone: Alone, mut warnings: Vec<String>) -> Self {
-        let channels = found.channels.iter().enumerate();
         warnings.extend(found.warnings.iter().map(ToString::to_string));
         Self {
             reference: found.reference + 1,
             frames: found.frames,
             pieces: found.pieces,
             measured: found.measured,
-            channels: channels
-                .map(|(i, one)| ChannelAlignment::new(spec, i + 1, one, found.instants(i).steps()))
-                .collect(),
+            channels: (0..found.channels.len()).map(|i| ChannelAlignment::new(spec, i, found)).collect(),
             alone,
             one_suffices: alone.suffices(),
             warnings,
@@ -294,6 +295,12 @@ impl AlignReport {
             let [delay, drift, gain, offset] =
                 [delay_samples, drift_ppm, gain, offset].map(|cell| shown(*cell));
             let _ = writeln!(text, "  {channel:<10} {skip:<11} {delay:<25} {drift:<25} {gain:<25} {offset}");
+        }
+        for channel in &self.channels {
+            let changes = level_changes(channel.changes);
+            if !changes.is_empty() {
+                let _ = writeln!(text, "changes    channel {}: {}", channel.channel, changes.join(", "));
+            }
         }
         let Alone { channel, snr_db, together_db } = self.alone;
         let verdict = if self.one_suffices { "one recorder suffices" } else { "fuse them" };

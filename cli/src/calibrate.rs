@@ -1,20 +1,23 @@
 //! `hybank calibrate`: delays, gains, offsets and cut-offs of the channels from captures.
 
 use super::bank_file::{bad_flag, parse_spec, read_kind};
-use super::calibrate_report::CalibrationReport;
+use super::calibrate_report::{CalibrationReport, DriftReport};
 use super::capture_args::{CaptureArgs, InterleavedArgs, check_stdin};
 use super::capture_file::{CaptureFile, MOST_MEASURED, ReadingRules, start, unread};
 use super::file_kind::FileKind;
 use super::measure::{ToneArg, tone, tones};
-use super::print::{Failure, check_json, explained, failed, say_understood, warn};
-use super::written::{check_output, write_text};
+use super::print::{Failure, check_json, explained, failed, is_dash, say_understood, warn};
+use super::written::{begin_file, check_together, write_text};
 use hybank::calibrate::{
     Acquisition, CalibrateError, Calibration, CalibrationSettings, CalibrationSignal, CalibrationWarning,
-    FittedValues, Fitting, Record, applied, calibrate_pooled, usual_reference,
+    FittedValues, Fitting, Record, Track, applied, calibrate_pooled, track, usual_reference,
 };
 use hybank::captures::{Captures, Converters};
+use hybank::files::commit_all;
 use hybank::messages::Quoted;
 use hybank::pipeline::matching::{check_channels, check_rate};
+use hybank::quantity::{self, WrittenTime};
+use hybank::sine_fit::CurveKind;
 use hybank::spec::{DesignOverrides, DesignSpec, Method, Spec, leaves_the_design_open};
 use hybank::units::FastPeriods;
 use std::path::{Path, PathBuf};
@@ -44,7 +47,8 @@ Examples:
       --fit delay,gain,offset,cutoff
   hybank calibrate spec.toml z?.csv --interleaved 4 --full-scale 8bits -o measured.toml
   hybank calibrate spec.toml ch1.wav ch2.wav -o measured.toml --training chirp.wav
-  hybank calibrate spec.toml ch1.wav ch2.wav -o measured.toml --blind")]
+  hybank calibrate spec.toml ch1.wav ch2.wav -o measured.toml --blind
+  hybank calibrate spec.toml ch1.wav ch2.wav -o measured.toml --tone 1.2kHz --drift drift.jsonl")]
 pub(super) struct Args {
     /// The spec (TOML) with the nominal values; `-` is standard input
     spec: PathBuf,
@@ -81,12 +85,22 @@ pub(super) struct Args {
     /// the values of the spec.
     #[arg(long, value_name = "VALUE,..", value_delimiter = ',')]
     fit: Vec<Fitting>,
-    /// Also find the static nonlinearity of each converter, a polynomial up to this order (2 to 32)
+    /// Also find the static nonlinearity of each converter: a polynomial up to this order, or a table
     ///
-    /// It is written where it lowers what the tones leave of samples that it was not fitted to.
-    #[arg(long, value_name = "ORDER", value_parser = clap::value_parser!(u8).range(2..=32),
-          conflicts_with_all = ["training", "blind"])]
-    nonlinearity: Option<u8>,
+    /// A table has a value for each code, so it follows the steps of converters by successive approximation
+    /// and of pipelines. Either is written where it lowers what the tones leave of samples that it was not
+    /// fitted to.
+    #[arg(long, value_name = "ORDER|table", value_parser = curve_kind, conflicts_with_all = ["training", "blind"])]
+    nonlinearity: Option<CurveKind>,
+    /// Also follow how delays, gains and offsets change, for `fuse --track`: lines of JSON
+    ///
+    /// A tone beside the signal (--tone) or any signal (--blind) tells them; what stays is a constant.
+    #[arg(long, value_name = "FILE", conflicts_with = "training")]
+    drift: Option<PathBuf>,
+    /// Length of the blocks of --drift, each of which is calibrated, as 10ms [default: a 64th of the
+    /// captures, 2048 frames or more]
+    #[arg(long, value_name = "TIME", value_parser = quantity::time, requires = "drift", hide_short_help = true)]
+    block: Option<WrittenTime>,
     /// Other captures of the same converters to check the calibrated spec with
     ///
     /// They hold the same kind of signal.
@@ -137,14 +151,15 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     let mut warnings = Vec::new();
     let done = args.calibrated(&spec, &mut warnings);
     // What the captures have may explain why they do not fit; a report has these warnings.
-    let (calibrated, report) = done.inspect_err(|_| warnings.iter().for_each(|warning| warn(warning)))?;
+    let (calibrated, report, drift) =
+        done.inspect_err(|_| warnings.iter().for_each(|warning| warn(warning)))?;
     let calibrated = args.with_method(calibrated, &text);
     let written = file.with_values(&text, &calibrated, &args.output).map_err(|problem| {
         report.warnings.iter().for_each(|warning| warn(warning));
         Failure::Input(format!("the values found make no spec: {problem}; nothing was written"))
     })?;
-    write_text(&args.output, &written, args.force)?;
-    report.print(&args.output, args.json)
+    args.write(&written, drift.as_ref())?;
+    report.print(&args.output, args.drift.as_deref(), args.json)
 }
 
 impl Args {
@@ -156,20 +171,63 @@ impl Args {
         if is_default && least_squares.is_fir() { least_squares } else { calibrated }
     }
 
-    /// The calibrated spec and the report. `warnings` are those of the captures.
+    /// Writes the spec and the lines of its drift, which appear together.
+    fn write(&self, spec: &str, drift: Option<&Track>) -> Result<(), Failure> {
+        let (Some(path), Some(track)) = (&self.drift, drift) else {
+            return write_text(&self.output, spec, self.force);
+        };
+        let lines: String = track.readings.iter().map(|reading| reading.line() + "\n").collect();
+        let mut files = vec![begin_file(path, lines.as_bytes(), self.force)?];
+        if is_dash(&self.output) {
+            write_text(&self.output, spec, self.force)?;
+        } else {
+            files.push(begin_file(&self.output, spec.as_bytes(), self.force)?);
+        }
+        commit_all(files).map_err(failed)
+    }
+
+    /// What the captures say of changes, if that is asked for. `spec` has the values that were found.
+    fn track(
+        &self,
+        spec: &Spec,
+        captures: &[Acquired],
+        found: &Calibration,
+        settings: CalibrationSettings,
+    ) -> Result<Option<Track>, Failure> {
+        let (Some(_), [captures]) = (&self.drift, captures) else {
+            return match &self.drift {
+                Some(_) => Err(Failure::Usage("--drift: give captures that were taken together".into())),
+                None => Ok(None),
+            };
+        };
+        let tones = found.tones.iter().map(|tone| tone.frequency.value).collect();
+        let signal = if self.blind { CalibrationSignal::Any } else { CalibrationSignal::Tones(tones) };
+        let frame = spec.fast_period * spec.ratio as f64;
+        let frames = self.block.map(|time| (time.in_seconds(spec.fast_period) / frame).round() as usize);
+        track(spec, &captures.records, &signal, settings, frames).map(Some).map_err(failed)
+    }
+
+    /// The calibrated spec, the report and what changes. `warnings` are those of the captures.
     fn calibrated(
         &self,
         spec: &Spec,
         warnings: &mut Vec<String>,
-    ) -> Result<(Spec, CalibrationReport), Failure> {
+    ) -> Result<(Spec, CalibrationReport, Option<Track>), Failure> {
         let (settings, signal) = (self.settings(spec)?, self.signal(spec)?);
         let captures = self.read(&self.captures, spec, warnings)?;
         let found = calibrate_pooled(spec, &borrowed(&captures), &signal, settings);
         let found = found.map_err(|error| of_captures(&captures, error))?;
-        self.check_misfit(&found, warnings)?;
-        let (calibrated, more) = applied(spec, &found);
+        let (mut calibrated, more) = applied(spec, &found);
+        let drift = self.track(&calibrated, &captures, &found, settings)?;
+        // What changes fits no values, but each block fits its own.
+        if let Some(drift) = &drift {
+            calibrated = applied(&calibrated, &drift.calibration).0;
+        }
+        let misfit = drift.as_ref().map_or(found.misfit, |drift| drift.calibration.misfit);
+        self.check_misfit(&found, misfit, warnings)?;
         let mut report = CalibrationReport::new(spec, &found);
         report.add(&more);
+        report.drift = drift.as_ref().map(DriftReport::from);
         if !self.check.is_empty() {
             let captures = self.read(&self.check, spec, warnings)?;
             let held_out = match signal {
@@ -177,21 +235,29 @@ impl Args {
                 CalibrationSignal::Tones(_) => CalibrationSignal::Tones(Vec::new()),
                 signal => signal,
             };
-            let fit = FittedValues { nonlinearity: None, ..settings.fit };
+            let values = FittedValues { nonlinearity: None, ..settings.fit };
+            // Delays and gains are compared; a cut-off takes more tones than they do.
+            let compared = FittedValues { cutoff: None, ..values };
+            let fit = if compared == FittedValues::NOTHING { values } else { compared };
             let settings = CalibrationSettings { fit, ..settings };
             let checked = calibrate_pooled(&calibrated, &borrowed(&captures), &held_out, settings)
                 .map_err(|error| Failure::Input(format!("the held-out captures: {error}")))?;
             report.check(&calibrated, &found, &checked);
         }
         report.warnings.splice(0..0, warnings.iter().cloned());
-        Ok((calibrated, report))
+        Ok((calibrated, report, drift))
     }
 
     /// Refuses values that the captures contradict. What explains that joins the `warnings`.
-    fn check_misfit(&self, found: &Calibration, warnings: &mut Vec<String>) -> Result<(), Failure> {
+    fn check_misfit(
+        &self,
+        found: &Calibration,
+        misfit: Option<f64>,
+        warnings: &mut Vec<String>,
+    ) -> Result<(), Failure> {
         use CalibrationWarning::{BandsDisagree, CutoffExplains, Outlying};
         let most = if self.blind { MOST_BLIND_MISFIT } else { MOST_MISFIT };
-        let Some(misfit) = found.misfit.filter(|&misfit| misfit > most && !self.force) else {
+        let Some(misfit) = misfit.filter(|&misfit| misfit > most && !self.force) else {
             return Ok(());
         };
         let reasons = |warning: &&CalibrationWarning| {
@@ -215,7 +281,8 @@ impl Args {
         if let Some(level) = self.clip.filter(|level| level.is_nan() || *level <= 0.0) {
             return Err(Failure::Usage(format!("--clip {level} is not a positive level")));
         }
-        check_output(&self.output, &inputs, self.force)
+        let outputs: Vec<&Path> = self.drift.iter().chain([&self.output]).map(PathBuf::as_path).collect();
+        check_together(&outputs, &inputs, self.force)
     }
 
     /// The acquisitions in these files, each with one record per channel of `spec`; what was tolerated joins
@@ -276,7 +343,7 @@ impl Args {
             .map_err(|error| bad_flag("fit", error.problem()))?;
         let given = if self.fit.is_empty() { &spec.fit } else { &self.fit };
         let fit = if given.is_empty() { FittedValues::default() } else { given.iter().copied().collect() };
-        let fit = FittedValues { nonlinearity: self.nonlinearity.map(usize::from), ..fit };
+        let fit = FittedValues { nonlinearity: self.nonlinearity, ..fit };
         let reference = reference(self.reference, spec)?;
         Ok(CalibrationSettings { fit, reference })
     }
@@ -299,6 +366,12 @@ impl Args {
         }
         tones(&self.tone).map(CalibrationSignal::Tones)
     }
+}
+
+fn curve_kind(text: &str) -> Result<CurveKind, String> {
+    let order = text.parse().ok().filter(|order| (2..=32).contains(order)).map(CurveKind::Order);
+    let kind = order.or_else(|| (text == "table").then_some(CurveKind::Table));
+    kind.ok_or_else(|| "give an order from 2 to 32, or table".to_owned())
 }
 
 /// The reference channel, from 0: the `given` one, from 1, or that of the spec.

@@ -1,8 +1,11 @@
 //! What `calibrate` prints.
 
 use super::print::{Failure, explained, is_dash, show, warn};
-use hybank::calibrate::{Calibration, CalibrationWarning, ChannelEstimate};
+use hybank::calibrate::{
+    Calibration, CalibrationWarning, ChannelChange, ChannelEstimate, LevelChange, Track,
+};
 use hybank::messages::Quoted;
+use hybank::runtime::Nonlinearity;
 use hybank::sine_fit::Estimate;
 use hybank::spec::{HALF_WIDTH, Spec};
 use hybank::units::FastPeriods;
@@ -37,9 +40,9 @@ struct CalibratedChannel {
     /// Factor of the cut-off frequency.
     #[serde(skip_serializing_if = "Option::is_none")]
     cutoff: Option<Interval>,
-    /// a_2, a_3, .. of the static nonlinearity; absent if it was not fitted, empty where it does not help.
+    /// As in a spec; absent if it was not fitted, an empty list where it does not help.
     #[serde(skip_serializing_if = "Option::is_none")]
-    nonlinearity: Option<Vec<f64>>,
+    nonlinearity: Option<Nonlinearity>,
     /// Clipped samples, which were left out.
     clipped: usize,
 }
@@ -72,6 +75,57 @@ struct CheckedChannel {
     gain: Option<Interval>,
 }
 
+/// How converters changed.
+#[derive(Debug, serde::Serialize)]
+pub(super) struct DriftReport {
+    /// Blocks of the captures, and those that were calibrated.
+    blocks: usize,
+    measured: usize,
+    channels: Vec<ChangedChannel>,
+}
+
+/// By how much; 0 where no change stands out of the noise.
+#[derive(Debug, serde::Serialize)]
+struct ChangedChannel {
+    channel: usize,
+    /// Fast periods.
+    delay_samples: f64,
+    #[serde(flatten)]
+    levels: LevelChange,
+}
+
+impl From<&Track> for DriftReport {
+    fn from(track: &Track) -> Self {
+        let channel = |(change, channel): (&ChannelChange, usize)| ChangedChannel {
+            channel,
+            delay_samples: change.delay.0,
+            levels: change.levels,
+        };
+        let channels = track.changes.iter().zip(1..).map(channel).collect();
+        Self { blocks: track.blocks, measured: track.measured, channels }
+    }
+}
+
+impl DriftReport {
+    fn text(&self) -> String {
+        let mut text = format!("drift      {} of {} blocks measured\n", self.measured, self.blocks);
+        for ChangedChannel { channel, delay_samples, levels } in &self.channels {
+            let delay = (*delay_samples > 0.0).then(|| format!("delay {delay_samples:.1e} fast periods"));
+            let changes: Vec<String> = delay.into_iter().chain(level_changes(*levels)).collect();
+            let changes = if changes.is_empty() { "steady".to_owned() } else { changes.join(", ") };
+            let _ = writeln!(text, "  channel {channel}: {changes}");
+        }
+        text
+    }
+}
+
+/// What of the gain and the offset of a channel changes.
+pub(super) fn level_changes(LevelChange { gain, offset }: LevelChange) -> Vec<String> {
+    let gain = (gain > 0.0).then(|| format!("gain {gain:.1e} of itself"));
+    let offset = (offset > 0.0).then(|| format!("offset {offset:.1e}"));
+    gain.into_iter().chain(offset).collect()
+}
+
 /// The report of a calibration.
 #[derive(Debug, serde::Serialize)]
 pub(super) struct CalibrationReport {
@@ -89,6 +143,8 @@ pub(super) struct CalibrationReport {
     misfit: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     check: Option<CheckReport>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) drift: Option<DriftReport>,
     notes: Vec<String>,
     pub(super) warnings: Vec<String>,
 }
@@ -133,6 +189,7 @@ impl CalibrationReport {
             modulus_samples: found.modulus.map(|modulus| modulus.0),
             misfit: found.misfit,
             check: None,
+            drift: None,
             notes: Vec::new(),
             warnings: Vec::new(),
         };
@@ -179,13 +236,14 @@ impl CalibrationReport {
         self.check = Some(CheckReport { channels, worst, agrees });
     }
 
-    pub(super) fn print(&self, output: &Path, json: bool) -> Result<(), Failure> {
+    /// `drift` is the file of the changes.
+    pub(super) fn print(&self, output: &Path, drift: Option<&Path>, json: bool) -> Result<(), Failure> {
         self.warnings.iter().for_each(|warning| warn(warning));
         // Standard output carries the spec.
-        if is_dash(output) { Ok(()) } else { show(self, json, |report| report.text(output)) }
+        if is_dash(output) { Ok(()) } else { show(self, json, |report| report.text(drift, output)) }
     }
 
-    fn text(&self, output: &Path) -> String {
+    fn text(&self, drift: Option<&Path>, output: &Path) -> String {
         let mut text = format!("{} frames, relative to channel {}:\n", self.frames, self.reference);
         for tone in &self.tones {
             let _ = writeln!(text, "  tone       {} Hz, zone {}", shown(tone.frequency), tone.zone);
@@ -198,13 +256,8 @@ impl CalibrationReport {
             if let Some(cutoff) = channel.cutoff {
                 let _ = write!(text, "  cut-off x {}", shown(cutoff));
             }
-            match channel.nonlinearity.as_deref() {
-                Some([]) => text.push_str("  no nonlinearity that helps"),
-                Some(curve) => {
-                    let largest = curve.iter().fold(0.0, |most: f64, a| most.max(a.abs()));
-                    let _ = write!(text, "  nonlinearity of order {}, up to {largest:.1e}", curve.len() + 1);
-                }
-                None => {}
+            if let Some(curve) = &channel.nonlinearity {
+                text += &nonlinearity_text(curve);
             }
             text.push('\n');
         }
@@ -222,11 +275,28 @@ impl CalibrationReport {
                 check.worst
             );
         }
+        text.extend(self.drift.iter().map(DriftReport::text));
         self.notes.iter().for_each(|note| {
             let _ = writeln!(text, "note: {note}");
         });
-        let _ = writeln!(text, "{}", Quoted(output));
+        for path in drift.into_iter().chain([output]) {
+            let _ = writeln!(text, "{}", Quoted(path));
+        }
         text
+    }
+}
+
+fn nonlinearity_text(curve: &Nonlinearity) -> String {
+    let values = curve.values();
+    let largest = values.iter().fold(0.0, |most: f64, a| most.max(a.abs()));
+    match curve {
+        _ if curve.is_straight() => "  no nonlinearity that helps".to_owned(),
+        Nonlinearity::Polynomial(_) => {
+            format!("  nonlinearity of order {}, up to {largest:.1e}", values.len() + 1)
+        }
+        Nonlinearity::Table { .. } => {
+            format!("  nonlinearity of {} codes, up to {largest:.1e}", values.len())
+        }
     }
 }
 

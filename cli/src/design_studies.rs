@@ -1,7 +1,7 @@
 //! What a design reports of integer taps, uncertain channels, the order, and a band in the spec.
 
 use hybank::bank::{Bank, FixedPoint};
-use hybank::design::quantise::WordStudy;
+use hybank::design::quantise::{TapsOfBits, WordStudy};
 use hybank::design::{
     Design, DesignError, DesignOptions, OrderErrorPoint, OrderReduction, RobustStudy, Study, design,
 };
@@ -41,12 +41,16 @@ impl<'a> WordReport<'a> {
             Some(word) => format!("{} lose {:.3} dB", word.bits, word.mean_square_loss_db),
             None => "no tap has fewer bits".to_owned(),
         };
+        let of_bits = |TapsOfBits { bits, taps }: &TapsOfBits| format!("{taps} of {bits}");
+        let taps: Vec<String> = choice.taps.iter().map(of_bits).collect();
         format!(
-            "words      {} times 2^{}, {} left out\n\
+            "words      {} times 2^{}, {} left out; taps by their bits: {}, in all {} per channel\n\
              \x20          {:.3} dB of the SNR of the real taps lost, {} allowed, over the whole spectrum of the signal; {why}\n",
             self.bits,
             -self.fraction_bits,
             counted(choice.taps_left_out, "tap"),
+            taps.join(", "),
+            choice.bits_per_channel,
             choice.snr_loss_db,
             choice.allowed_db,
         )

@@ -10,7 +10,8 @@ use super::print::{
 use super::run::{BankRun, each_block, frames_of};
 use super::written::{Mono, begin_recording, check_outputs};
 use hybank::bank::Bank;
-use hybank::captures::{Converters, FileFormat, LevelChange, LevelTrack};
+use hybank::calibrate::LevelChange;
+use hybank::captures::{Converters, FileFormat, LevelTrack};
 use hybank::files::{Bound, commit_all, read_text};
 use hybank::io::table::{TableOptions, read_stamped};
 use hybank::io::{MultiReader, RecordedFrames};
@@ -44,7 +45,7 @@ pub(super) struct InstantArgs {
 /// The option that `fuse` and `stream` have.
 #[derive(Debug, clap::Args)]
 pub(super) struct TrackArgs {
-    /// Follow delays that change: drift.jsonl of `align --trim`, or a table (.csv)
+    /// Follow what changes: the lines of `calibrate --drift` or `align --trim`, or a table (.csv)
     ///
     /// The table has a time and the delay of each channel, both in seconds, with headings, as
     /// `time,delay 1,delay 2`. Columns with the gain of each channel, and then with its offset, may follow.
@@ -249,7 +250,7 @@ struct Drift {
 /// Reads the table: lines of JSON as `align` writes them, or a table with headings.
 fn read(path: &Path, bank: &Bank) -> Result<Drift, Failure> {
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("jsonl")) {
-        return Ok(Drift { delays: read_lines(path, bank)?, levels: None });
+        return read_lines(path, bank);
     }
     let table = read_stamped(path, &TableOptions::default()).map_err(failed)?.ok_or_else(|| {
         failed_at(
@@ -258,16 +259,27 @@ fn read(path: &Path, bank: &Bank) -> Result<Drift, Failure> {
         )
     })?;
     let (mut columns, channels) = (table.columns, bank.channel_count());
-    let mut levels = None;
-    if columns.len() == 2 * channels || columns.len() == 3 * channels {
-        let mut gains = columns.split_off(channels);
-        let offsets = (gains.len() > channels).then(|| gains.split_off(channels));
-        let track = LevelTrack::new(bank, table.stamps.clone(), gains, offsets);
-        levels = Some(track.map_err(|error| failed_at(path, error))?);
+    let has_levels = columns.len() == 2 * channels || columns.len() == 3 * channels;
+    let mut gains = has_levels.then(|| columns.split_off(channels));
+    let offsets = gains.as_mut().filter(|all| all.len() > channels).map(|all| all.split_off(channels));
+    Drift::new(path, bank, table.stamps, [Some(columns), gains, offsets])
+}
+
+impl Drift {
+    /// Of columns of delays in seconds, gains and offsets.
+    fn new(
+        path: &Path,
+        bank: &Bank,
+        times: Vec<Seconds>,
+        [delays, gains, offsets]: [Option<Vec<Vec<f64>>>; 3],
+    ) -> Result<Self, Failure> {
+        let has_levels = gains.is_some() || offsets.is_some();
+        let levels = has_levels.then(|| LevelTrack::new(bank, times.clone(), gains, offsets));
+        let levels = levels.transpose().map_err(|error| failed_at(path, error))?;
+        let seconds = |column: Vec<f64>| column.into_iter().map(Seconds).collect();
+        let delays = delays.unwrap_or_default().into_iter().map(seconds).collect();
+        Ok(Self { delays: DelayTrack { times, delays }, levels })
     }
-    let seconds = |column: Vec<f64>| column.into_iter().map(Seconds).collect();
-    let delays = DelayTrack { times: table.stamps, delays: columns.into_iter().map(seconds).collect() };
-    Ok(Drift { delays, levels })
 }
 
 /// A line of `drift.jsonl`.
@@ -276,24 +288,51 @@ struct DriftLine {
     frame: u64,
     /// D_i in seconds; of a channel of which the line says nothing none.
     delay: Vec<Option<f64>>,
+    /// g_i and o_i, where those of some channel change.
+    gain: Option<Vec<f64>>,
+    offset: Option<Vec<f64>>,
 }
 
-fn read_lines(path: &Path, bank: &Bank) -> Result<DelayTrack, Failure> {
+impl DriftLine {
+    /// Delays, gains and offsets, if the line says something of the delay of each channel.
+    fn values(self) -> Option<[Option<Vec<f64>>; 3]> {
+        Some([Some(self.delay.into_iter().collect::<Option<_>>()?), self.gain, self.offset])
+    }
+}
+
+fn read_lines(path: &Path, bank: &Bank) -> Result<Drift, Failure> {
     let text = read_text(path, TABLE).map_err(failed)?;
-    let (mut times, mut delays) = (Vec::new(), vec![Vec::new(); bank.channel_count()]);
+    let (mut times, mut lines) = (Vec::new(), Vec::new());
     for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let refused = |problem: String| failed_at(path, format!("line {}: {problem}", number + 1));
-        let DriftLine { frame, delay } =
-            serde_json::from_str(line).map_err(|error| refused(error.to_string()))?;
-        if delay.len() != delays.len() {
-            return Err(refused(format!("{} for {} channels", counted(delay.len(), "delay"), delays.len())));
+        let line: DriftLine = serde_json::from_str(line).map_err(|error| refused(error.to_string()))?;
+        let wanted = bank.channel_count();
+        let lengths =
+            [Some(line.delay.len()), line.gain.as_ref().map(Vec::len), line.offset.as_ref().map(Vec::len)];
+        for (what, length) in ["delay", "gain", "offset"].into_iter().zip(lengths) {
+            if let Some(length) = length.filter(|length| *length != wanted) {
+                return Err(refused(format!("{} for {wanted} channels", counted(length, what))));
+            }
         }
+        let time = Seconds(line.frame as f64 * bank.slow_period().0);
         // A line that says nothing of a channel is left to the lines around it.
-        let Some(delay) = delay.into_iter().collect::<Option<Vec<f64>>>() else { continue };
-        times.push(Seconds(frame as f64 * bank.slow_period().0));
-        delays.iter_mut().zip(delay).for_each(|(column, delay)| column.push(Seconds(delay)));
+        let Some(values) = line.values() else { continue };
+        let first = lines.first().unwrap_or(&values);
+        if first.iter().zip(&values).any(|(first, own)| first.is_some() != own.is_some()) {
+            return Err(refused(
+                "gains or offsets are in some of the lines; give them in all or in none".into(),
+            ));
+        }
+        times.push(time);
+        lines.push(values);
     }
-    Ok(DelayTrack { times, delays })
+    let column =
+        |kind: usize, i: usize| lines.iter().filter_map(|line| Some(line[kind].as_ref()?[i])).collect();
+    let columns = |kind: usize| -> Option<Vec<Vec<f64>>> {
+        let is_given = kind == 0 || lines.first().is_some_and(|line| line[kind].is_some());
+        is_given.then(|| (0..bank.channel_count()).map(|i| column(kind, i)).collect())
+    };
+    Drift::new(path, bank, times, [0, 1, 2].map(columns))
 }
 
 impl TrackedReport {

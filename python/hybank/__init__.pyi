@@ -380,7 +380,7 @@ def calibrate(
     interleaved: int | None = None,
     axis: int = -1,
     full_scale: float | str | None = None,
-    nonlinearity: int | None = None,
+    nonlinearity: int | str | None = None,
 ) -> Calibration: ...
 @overload
 def measure(

@@ -231,8 +231,9 @@ def calibrate(
     full_scale : float or str, optional
         Full scale of the converters: "12bits", "u12bits" or a number; that of the spec or its bits if left out.
 
-    nonlinearity : int, optional
-        Also find the static nonlinearity of each converter, a polynomial up to this order (2 to 32), by tones.
+    nonlinearity : int or "table", optional
+        Also find the static nonlinearity of each converter by tones: a polynomial up to this order (2 to 32), or a table
+        with a value for each code.
 
     Returns
     -------

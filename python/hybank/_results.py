@@ -430,7 +430,8 @@ class Calibration:
     misfit
         1 where the model fits to the noise; None if there are no degrees of freedom left.
     nonlinearity
-        Coefficients a_2, a_3, .. of each channel, none where they do not help; None if they were not asked for.
+        Coefficients a_2, a_3, .. of each channel, or the entries of its table; none where they do not help. None if they
+        were not asked for.
     notes
         What the values mean.
     warnings

@@ -12,7 +12,8 @@ use hybank::calibrate::{
     CalibrationWarning, ChannelEstimate, FittedValues, Fitting, applied,
 };
 use hybank::captures::Converters;
-use hybank::sine_fit::Estimate;
+use hybank::runtime::Nonlinearity;
+use hybank::sine_fit::{CurveKind, Estimate};
 use hybank::spec::Spec;
 use hybank::units::{FastPeriods, Hertz};
 use numpy::PyArray1;
@@ -33,7 +34,7 @@ pub(crate) fn calibrate<'py>(
     clip: Option<f64>,
     axis: isize,
     full_scale: Option<&Bound<'_, PyAny>>,
-    nonlinearity: Option<usize>,
+    nonlinearity: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = x.py();
     let spec = sources::spec(spec)?;
@@ -47,10 +48,7 @@ pub(crate) fn calibrate<'py>(
         return Err(refused("clip: give a positive level"));
     }
     let records = held.captures()?.records(clip);
-    if nonlinearity.is_some_and(|order| !(2..=32).contains(&order)) {
-        return Err(refused("nonlinearity: give an order from 2 to 32"));
-    }
-    let fit = FittedValues { nonlinearity, ..fitted(&fit)? };
+    let fit = FittedValues { nonlinearity: nonlinearity.map(curve_kind).transpose()?, ..fitted(&fit)? };
     let settings = CalibrationSettings { fit, reference: reference_of(&spec, reference)? };
     let nominal = spec.clone();
     let found =
@@ -98,6 +96,18 @@ pub(crate) fn reference_of(spec: &Spec, given: Option<usize>) -> PyResult<usize>
         Some(channel) => Ok(channel - 1),
         None => Ok(calibration::usual_reference(spec)),
     }
+}
+
+/// The coefficients of each converter, or the entries of its table.
+fn values(curves: &[Nonlinearity]) -> Vec<&[f64]> {
+    curves.iter().map(Nonlinearity::values).collect()
+}
+
+fn curve_kind(given: &Bound<'_, PyAny>) -> PyResult<CurveKind> {
+    let order = given.extract().ok().filter(|order| (2..=32).contains(order)).map(CurveKind::Order);
+    let is_table = || given.extract::<String>().is_ok_and(|text| text == "table");
+    let kind = order.or_else(|| is_table().then_some(CurveKind::Table));
+    kind.ok_or_else(|| refused("nonlinearity: give an order from 2 to 32, or \"table\""))
 }
 
 /// A tone that was used.
@@ -148,7 +158,7 @@ fn result<'py>(py: Python<'py>, spec: &Spec, found: &Calibration) -> PyResult<Bo
         .with("frames", found.frames)?
         .with("clipped", &found.clipped)?
         .with("misfit", found.misfit)?
-        .with("nonlinearity", &found.nonlinearity)?
+        .with("nonlinearity", found.nonlinearity.as_ref().map(|curves| values(curves)))?
         .with("notes", texts(notes))?
         .with("warnings", texts(warnings))?
         .object()

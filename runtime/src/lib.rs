@@ -55,8 +55,8 @@ mod stream;
 mod tests;
 
 pub use adapters::{
-    FrameSink, FrameSource, Frames, Halves, Interleaved, PcmOutput, Planar, SideBySide, SplitOutput, Zeros,
-    nonlinearity,
+    FrameSink, FrameSource, Frames, Halves, Interleaved, Nonlinearity, PcmOutput, Planar, SideBySide,
+    SplitOutput, Zeros,
 };
 pub use algorithms::choice::{Algorithm, ParseAlgorithmError, Precision};
 pub use algorithms::recursive::{DelayLines, DelayedInput, StateMatrices};

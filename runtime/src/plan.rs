@@ -5,7 +5,7 @@ use crate::algorithms::choice::{ChosenAlgorithm, check_recursive};
 use crate::algorithms::{AlgorithmFacts, Direct, OverlapSave, Recursive};
 use crate::engine::{Engine, Fir, StatefulFilter};
 use crate::state::Digest;
-use crate::{Algorithm, BuildError, Isa, Precision, Sample, Shape, StateMatrices};
+use crate::{Algorithm, BuildError, Isa, Nonlinearity, Precision, Sample, Shape, StateMatrices};
 use std::sync::Arc;
 
 /// How a bank is made ready to run.
@@ -130,22 +130,20 @@ impl Plan {
     }
 
     /// As [`Plan::with_offsets`] for converters whose samples also have a static nonlinearity: of a sample x
-    /// of channel i
-    ///
-    /// ```text
-    /// sum over k of nonlinearity[i][k - 2] T_k(x) + offsets[i],   k = 2, 3, ..
-    /// ```
-    ///
-    /// is subtracted, with the Chebyshev polynomials T_k; beyond -1 .. 1 they keep the value of the end. An
-    /// empty list of channels stands for none.
+    /// of channel i `nonlinearity[i].at(x) + offsets[i]` is subtracted. An empty list of channels stands for
+    /// none.
     ///
     /// # Errors
     /// As [`Plan::with_offsets`].
-    pub fn with_corrections(self, offsets: &[f64], nonlinearity: &[Vec<f64>]) -> Result<Self, BuildError> {
+    pub fn with_corrections(
+        self,
+        offsets: &[f64],
+        nonlinearity: &[Nonlinearity],
+    ) -> Result<Self, BuildError> {
         let mut digest = self.digest;
         digest.add_list(offsets);
         if !nonlinearity.is_empty() {
-            digest.add_lists(nonlinearity);
+            digest.add_lists(&nonlinearity.iter().map(|one| one.values().to_vec()).collect::<Vec<_>>());
         }
         let corrections = Corrections::new(offsets, nonlinearity, self.channels)?.map(Arc::new);
         Ok(Self { corrections, digest, ..self })

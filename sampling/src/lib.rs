@@ -14,12 +14,14 @@
 pub mod fit;
 pub mod fit2;
 mod kernel;
+mod learned;
 pub mod nonuniform;
 mod recurrent;
 mod smoothing;
 
 pub use fit::{Fit, FitSample};
 pub use fit2::Fit2;
+pub use learned::{Known, LearnedCourse, LearnedSpline, few_readings, median, usual_deviation};
 pub use recurrent::Recurrent;
 pub use smoothing::{LeftOut, SmoothingSpline};
 

@@ -1,27 +1,11 @@
 //! When the samples of a recording were taken, on the clock of the reference.
 
-use super::path::usual;
 use crate::sampling::nonuniform::Measured;
-use crate::sampling::{LeftOut, SmoothingSpline};
+use crate::sampling::{Known, LearnedSpline, few_readings};
 use crate::sine_fit::Estimate;
 use serde::Serialize;
 use std::ops::Range;
 
-/// Readings beyond this many standard deviations of what the others say are refused.
-const GATE_SIGMAS: f64 = 5.0;
-/// Rounds in which readings are refused, those that contradict the others most in each.
-const ROUNDS: usize = 12;
-/// Readings on each side of the worst one that are judged again without it.
-const BESIDE: usize = 4;
-/// Readings scatter by no less than this share of their deviations, which are those of the Cramer-Rao bound
-/// as far as few samples say it: else a rate that walks through all of them would explain them.
-const LEAST_SCALE: f64 = 0.7;
-/// A sum of negative logarithms that is larger than the least by this may be the right one: half the 95 %
-/// point of chi-square with one degree of freedom.
-const LIKELY_SURPRISE: f64 = 1.92;
-/// Powers of ten of the variance by which a rate may walk per sample. That of 1 ppm in a second is 2e-17 at
-/// 48 kHz.
-const WALKS: std::ops::RangeInclusive<i32> = -26..=-9;
 /// Rounds in which the sample of an instant is found.
 const INVERSE_ROUNDS: usize = 5;
 
@@ -36,6 +20,12 @@ pub(super) struct ClockReading {
     pub(super) lag: f64,
     /// Standard deviation of the lag.
     pub(super) deviation: f64,
+}
+
+impl ClockReading {
+    fn measured(&self) -> Measured {
+        Measured { x: self.sample, value: self.lag, error: self.deviation, jitter: 0.0 }
+    }
 }
 
 /// A place where a recording lacks samples, or has some that the reference has not.
@@ -55,7 +45,7 @@ pub struct ClockStep {
 #[derive(Debug, Clone)]
 pub struct ClockCourse {
     /// The lag over the samples with the steps mended. None for the reference.
-    smooth: Option<Smooth>,
+    smooth: Option<LearnedSpline>,
     /// By their samples.
     steps: Vec<ClockStep>,
     /// Those that were not refused, by their pieces.
@@ -70,24 +60,13 @@ impl ClockCourse {
 
     /// Through readings of a recording with these steps. `None` if no spline goes through them, and with
     /// those of fewer than two samples.
-    pub(super) fn new(mut readings: Vec<ClockReading>, steps: Vec<ClockStep>) -> Option<Self> {
-        let has_two_samples = readings.iter().any(|reading| reading.sample != readings[0].sample);
-        if !has_two_samples {
-            return None;
-        }
-        for _ in 0..ROUNDS {
-            let worst = contradictory(&Smooth::new(&readings)?.spline);
-            // Without two samples nothing is left to be judged by.
-            if worst.is_empty() || readings.len() < worst.len() + 2 {
-                break;
-            }
-            for k in worst.into_iter().rev() {
-                readings.remove(k);
-            }
-        }
-        let smooth = Smooth::new(&readings)?;
-        readings.iter_mut().for_each(|reading| reading.deviation *= smooth.scale);
-        Some(Self { smooth: Some(smooth), steps, readings })
+    pub(super) fn new(readings: Vec<ClockReading>, steps: Vec<ClockStep>) -> Option<Self> {
+        let all: Vec<Measured> = readings.iter().map(ClockReading::measured).collect();
+        let (smooth, kept) = LearnedSpline::through(&all)?;
+        let kept = kept.into_iter().map(|k| readings[k]);
+        let readings =
+            kept.map(|reading| ClockReading { deviation: reading.deviation * smooth.scale(), ..reading });
+        Some(Self { readings: readings.collect(), smooth: Some(smooth), steps })
     }
 
     /// The instant of a sample, in samples of the reference.
@@ -114,14 +93,14 @@ impl ClockCourse {
 
     /// By how much a sample of the mended recording is larger than its instant.
     pub(super) fn lag(&self, mended: f64) -> f64 {
-        self.smooth.as_ref().map_or(0.0, |smooth| smooth.spline.value(mended))
+        self.smooth.as_ref().map_or(0.0, |smooth| smooth.value(mended))
     }
 
     /// The same with its deviation.
     pub(super) fn known(&self, mended: f64) -> Estimate<f64> {
-        let Some(Smooth { spline, scale }) = &self.smooth else { return Estimate { value: 0.0, sigma: 0.0 } };
-        let known = spline.at(mended);
-        Estimate { value: known.value, sigma: scale * known.variance.sqrt() }
+        let Some(smooth) = &self.smooth else { return Estimate { value: 0.0, sigma: 0.0 } };
+        let Known { value, deviation } = smooth.at(mended);
+        Estimate { value, sigma: deviation }
     }
 
     /// The sample of the mended recording that was taken at an instant.
@@ -144,7 +123,7 @@ impl ClockCourse {
         let slope = sum(&|one| (one.sample - middle) * (one.lag - mean)) / squares;
         let misfit = sum(&|one| (one.lag - mean - slope * (one.sample - middle)).powi(2));
         let freedom = self.readings.len().saturating_sub(2).max(1) as f64;
-        let scatter = (misfit / freedom * of_few(freedom) / squares).sqrt();
+        let scatter = (misfit / freedom * few_readings(freedom) / squares).sqrt();
         // From samples of the recording to those of the reference.
         Estimate { value: slope / (1.0 - slope), sigma: scatter }
     }
@@ -153,76 +132,6 @@ impl ClockCourse {
     pub(super) fn reading(&self, piece: usize) -> Option<&ClockReading> {
         self.readings.binary_search_by_key(&piece, |reading| reading.piece).ok().map(|k| &self.readings[k])
     }
-}
-
-/// A spline through readings whose deviations are right up to a factor.
-#[derive(Debug, Clone)]
-struct Smooth {
-    spline: SmoothingSpline,
-    /// The factor.
-    scale: f64,
-}
-
-impl Smooth {
-    /// The smoothest spline whose readings are predicted by the others as well as by any (leave-one-out
-    /// predictive density; S. Geisser, *The predictive sample reuse method*, J. Am. Stat. Assoc. 70, 1975).
-    fn new(readings: &[ClockReading]) -> Option<Self> {
-        let measured = |reading: &ClockReading| Measured {
-            x: reading.sample,
-            value: reading.lag,
-            error: reading.deviation,
-            jitter: 0.0,
-        };
-        let all: Vec<Measured> = readings.iter().map(measured).collect();
-        let walks = std::iter::once(0.0).chain(WALKS.map(|exponent| 10f64.powi(exponent)));
-        let splines = walks.filter_map(|walk| SmoothingSpline::new(all.clone(), walk).ok());
-        let judged: Vec<(ClockAgreement, SmoothingSpline)> =
-            splines.map(|spline| (ClockAgreement::new(&spline), spline)).collect();
-        let least = judged.iter().map(|(judged, _)| judged.surprise).fold(f64::INFINITY, f64::min);
-        let is_good =
-            |(judged, _): &(ClockAgreement, SmoothingSpline)| judged.surprise <= least + LIKELY_SURPRISE;
-        let (judged, spline) = judged.into_iter().find(is_good)?;
-        let freedom = readings.len().saturating_sub(2).max(1) as f64;
-        Some(Self { spline, scale: judged.scale * of_few(freedom).sqrt() })
-    }
-}
-
-/// How well each reading is predicted by the others.
-struct ClockAgreement {
-    /// Root mean square of what readings miss the others by, over the stated deviations.
-    scale: f64,
-    /// Sum of the negative logarithms of the predictive densities.
-    surprise: f64,
-}
-
-impl ClockAgreement {
-    fn new(spline: &SmoothingSpline) -> Self {
-        let all: Vec<LeftOut> = spline.left_out().collect();
-        let ratios = || all.iter().map(|out| out.miss / out.deviation);
-        let most = GATE_SIGMAS * usual(ratios().collect());
-        let count = all.len() as f64;
-        let squares = ratios().map(|ratio| ratio.min(most).powi(2)).sum::<f64>();
-        let scale = (squares / count).sqrt().max(LEAST_SCALE);
-        let deviations = all.iter().map(|out| out.deviation.ln()).sum::<f64>();
-        Self { scale, surprise: deviations + count * scale.ln() + 0.5 * squares / (scale * scale) }
-    }
-}
-
-/// Square of the factor by which a deviation that was measured with so many degrees of freedom is short of
-/// that whose 95 % interval is that of the normal law: Student's law, within 3 %.
-pub(super) fn of_few(freedom: f64) -> f64 {
-    (1.0 + 1.2 / freedom + 2.4 / (freedom * freedom)).powi(2)
-}
-
-/// The samples that contradict the others, each the worst of those beside it.
-fn contradictory(spline: &SmoothingSpline) -> Vec<usize> {
-    let found: Vec<f64> = spline.left_out().map(|out| out.miss / out.deviation).collect();
-    let gate = GATE_SIGMAS * usual(found.clone());
-    let is_worst = |k: &usize| {
-        let beside = k.saturating_sub(BESIDE)..(k + BESIDE + 1).min(found.len());
-        found[*k] > gate && beside.into_iter().all(|j| j == *k || found[j] < found[*k])
-    };
-    (0..found.len()).filter(is_worst).collect()
 }
 
 #[cfg(test)]

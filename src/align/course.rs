@@ -1,9 +1,10 @@
 //! The delays over the time that all recordings have in common, and the spec for them.
 
-use super::clock::{ClockCourse, ClockReading, ClockStep, of_few};
+use super::clock::{ClockCourse, ClockReading, ClockStep};
 use super::pieces::PieceEstimate;
-use super::{AlignWarning, AlignedChannel, Reading, Stretches};
-use crate::calibrate::{Calibration, CalibrationWarning, ChannelEstimate, applied};
+use super::{AlignWarning, AlignedChannel, Stretches};
+use crate::calibrate::{Calibration, CalibrationWarning, ChannelEstimate, LevelCourses, Reading, applied};
+use crate::sampling::few_readings;
 use crate::sine_fit::Estimate;
 use crate::spec::{HALF_WIDTH, Spec};
 use crate::units::{FastPeriods, Seconds};
@@ -168,8 +169,9 @@ impl<'a> Course<'a> {
         Estimate { value: middle.in_fast_periods(h), sigma: FastPeriods(half / h / HALF_WIDTH) }
     }
 
-    /// The delays as measured, in frames after the cut, all later by the fast periods that were added.
-    pub(super) fn readings(&self, skips: &[usize], raised: usize) -> Vec<Reading> {
+    /// The delays as measured, in frames after the cut, all later by the fast periods that were added, and
+    /// the levels there.
+    pub(super) fn readings(&self, skips: &[usize], raised: usize, levels: &LevelCourses) -> Vec<Reading> {
         let added = self.spec.fast_period * raised as f64;
         let of = |(piece, centre): (usize, &f64)| {
             let frame = (centre.round() as u64).checked_sub(skips[self.reference] as u64)?;
@@ -186,7 +188,9 @@ impl<'a> Course<'a> {
                 Some((delay, self.slow_period() * reading.deviation))
             };
             let delays: Vec<_> = self.clocks.iter().enumerate().map(delay).collect();
-            delays.iter().any(Option::is_some).then_some(Reading { frame, delays })
+            let [gains, offsets] = levels.at(frame as f64);
+            let is_measured = delays.iter().any(Option::is_some);
+            is_measured.then_some(Reading { frame, delays, gains, offsets })
         };
         self.centres.iter().enumerate().filter_map(of).collect()
     }
@@ -206,6 +210,6 @@ pub(super) fn mean(estimates: impl Iterator<Item = Estimate<f64>>) -> Option<Est
     let value = all.iter().map(|(value, weight)| value * weight).sum::<f64>() / weights;
     let squares: f64 = all.iter().map(|(x, weight)| weight * (x - value).powi(2)).sum();
     let freedom = all.len().saturating_sub(1) as f64;
-    let misfit = if freedom > 0.0 { squares / freedom * of_few(freedom) } else { 1.0 };
+    let misfit = if freedom > 0.0 { squares / freedom * few_readings(freedom) } else { 1.0 };
     value.is_finite().then(|| Estimate { value, sigma: (misfit / weights).sqrt() })
 }

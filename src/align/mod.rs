@@ -12,18 +12,16 @@ mod error;
 mod local;
 mod path;
 mod pieces;
-mod reading;
 mod steps;
 #[cfg(test)]
 mod tests;
 
 pub use clock::{ClockCourse, ClockStep};
 pub use error::{AlignError, AlignWarning};
-pub use reading::Reading;
 
 use crate::calibrate::{
-    CalibrationSettings, CalibrationSignal, CalibrationWarning, ChannelEstimate, FittedValues, Record, check,
-    check_parts, line,
+    CalibrationSettings, CalibrationSignal, CalibrationWarning, ChannelEstimate, FittedValues, LevelChange,
+    LevelCourses, Reading, Record, check, check_parts, line,
 };
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
@@ -72,8 +70,11 @@ pub struct Alignment {
     pub pieces: usize,
     /// Pieces that gave delays.
     pub measured: usize,
-    /// The delays over these frames, as measured; those that contradict the others are left out.
+    /// The delays over these frames, as measured; those that contradict the others are left out. Gains and
+    /// offsets that change, as smooth courses.
     pub readings: Vec<Reading>,
+    /// By how much the gain and the offset of each channel change.
+    pub changes: Vec<LevelChange>,
     /// The spec with the delays, gains and offsets, and with an uncertainty that holds the course of each
     /// delay: or, if that is longer than a slow period, all delays of one.
     pub spec: Spec,
@@ -255,7 +256,12 @@ fn alignment(
         warnings
             .extend(met.map(|(pair, at)| AlignWarning::Coincidence { channels: pair.map(|i| i + 1), at }));
     }
-    let readings = course.readings(&skips, raised);
+    let first = skips[reference] as f64;
+    let levels = estimates.iter().map(|one| (one.centre - first, one.channels.as_slice()));
+    let levels = LevelCourses::new(&spec, levels);
+    let readings = course.readings(&skips, raised, &levels);
+    let at: Vec<f64> = readings.iter().map(|reading| reading.frame as f64).collect();
+    let changes = levels.changes(&at);
     let clocks = course.into_clocks();
-    Alignment { reference, channels, frames, pieces, measured, readings, spec, warnings, clocks }
+    Alignment { reference, channels, frames, pieces, measured, readings, changes, spec, warnings, clocks }
 }

@@ -7,6 +7,7 @@
 
 use super::local::{LocalLag, SearchWindow};
 use crate::calibrate::{LagLine, Record};
+use crate::sampling::{median, usual_deviation};
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::ops::Range;
 
@@ -39,9 +40,6 @@ const LEAST_SHARE: f64 = 0.5;
 /// Pieces between those whose lags give the rate: many of all would have steps between them.
 const RATE_PIECES: usize = 16;
 const PIECES_PER_RATE: usize = 64;
-
-/// Median of the absolute values of a normal law, in its deviations.
-const MEDIAN_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
 
 /// A piece whose lag is known.
 #[derive(Debug, Clone, Copy)]
@@ -183,7 +181,7 @@ impl<'a> PathSearch<'a> {
         let rate = rate(&found.iter().map(|found| found.1).collect::<Vec<_>>());
         let beyond: Vec<f64> = found.iter().map(|(_, known)| known.lag - rate * known.at).collect();
         let moves = beyond.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
-        let near = (NEAR_SIGMAS * usual(moves) * FRAC_1_SQRT_2).clamp(LEAST_NEAR, MOST_NEAR);
+        let near = (NEAR_SIGMAS * usual_deviation(moves) * FRAC_1_SQRT_2).clamp(LEAST_NEAR, MOST_NEAR);
         let agrees = |k: usize| {
             let beside = k.saturating_sub(BESIDE)..(k + BESIDE + 1).min(beyond.len());
             (beyond[k] - median(beyond[beside].to_vec())).abs() <= near
@@ -207,17 +205,6 @@ fn rate(known: &[KnownLag]) -> f64 {
     let apart = (known.len() / PIECES_PER_RATE).clamp(1, RATE_PIECES);
     let slope = |pair: (&KnownLag, &KnownLag)| (pair.1.lag - pair.0.lag) / (pair.1.at - pair.0.at);
     median(known.iter().zip(known.iter().skip(apart)).map(slope).collect())
-}
-
-/// The standard deviation of a normal law that has the same median of absolute values.
-pub(super) fn usual(misfits: Vec<f64>) -> f64 {
-    median(misfits) / MEDIAN_OF_NORMAL
-}
-
-/// The median; 0 of nothing.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// The ranges in which a condition holds.

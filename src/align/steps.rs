@@ -4,8 +4,9 @@
 //! it fit the reference best at the one lag, and those after it at the other.
 
 use super::clock::ClockStep;
-use super::path::{Disagree, KnownLag, Path, PathSearch, median};
+use super::path::{Disagree, KnownLag, Path, PathSearch};
 use crate::calibrate::{LagLine, Record, interpolated, stretch};
+use crate::sampling::median;
 use crate::simulate::Instants;
 use crate::units::FastPeriods;
 

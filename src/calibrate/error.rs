@@ -230,6 +230,30 @@ pub enum CalibrateError {
         /// Number of acquisitions.
         acquisitions: usize,
     },
+    /// Captures that are too short to tell how converters change.
+    #[error(
+        "{frames} frames make {blocks} blocks, and {needed} are needed to follow changes; record more, or take shorter blocks"
+    )]
+    FewBlocks {
+        /// Blocks.
+        blocks: usize,
+        /// Frames of the captures.
+        frames: usize,
+        /// Blocks needed.
+        needed: usize,
+    },
+    /// Most blocks of the captures cannot be calibrated.
+    #[error(
+        "only {measured} of {blocks} blocks of the captures can be calibrated, and half of them must: {reason}; take longer blocks"
+    )]
+    BlocksNotMeasured {
+        /// Blocks that were calibrated.
+        measured: usize,
+        /// All blocks.
+        blocks: usize,
+        /// Why the first one was not.
+        reason: Box<CalibrateError>,
+    },
     /// A sine fit failed.
     #[error(transparent)]
     Tones(#[from] SineFitError),

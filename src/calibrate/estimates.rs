@@ -4,6 +4,7 @@ use super::fit::ChannelParameter;
 use super::model::{ChannelModel, ChannelValues, Parameter};
 use super::warning::CalibrationWarning;
 use crate::linalg::Mat;
+use crate::runtime::Nonlinearity;
 use crate::sine_fit::Estimate;
 use crate::spec::{Cutoff, HALF_WIDTH, OneOrEach, Spec, UncertaintySpec};
 use crate::units::{FastPeriods, Hertz};
@@ -23,9 +24,9 @@ pub struct Calibration {
     pub channels: Vec<ChannelEstimate>,
     /// The part of the front ends whose cut-offs were fitted.
     pub cutoff: Option<Cutoff>,
-    /// The static nonlinearity of each channel, if it was fitted: a_2, a_3, .., none where a curve does not
-    /// lower what the tones leave of samples that it was not fitted to.
-    pub nonlinearity: Option<Vec<Vec<f64>>>,
+    /// The static nonlinearity of each channel, if it was fitted: none where a curve does not lower what the
+    /// tones leave of samples that it was not fitted to.
+    pub nonlinearity: Option<Vec<Nonlinearity>>,
     /// The tones, if there were any.
     pub tones: Vec<CalibrationTone>,
     /// Delays are known modulo this, if tones were used and leave a second value within a thousand periods
@@ -82,7 +83,7 @@ pub(super) struct Fitted {
     pub(super) frames: usize,
     pub(super) warnings: Vec<CalibrationWarning>,
     /// The nonlinearities of the channels, if they were asked for.
-    pub(super) curves: Vec<Vec<f64>>,
+    pub(super) curves: Vec<Nonlinearity>,
 }
 
 impl Fitted {

@@ -1,5 +1,6 @@
 //! What a calibration fits.
 
+use crate::sine_fit::CurveKind;
 use crate::spec::{Cutoff, Fitting};
 use std::fmt;
 
@@ -14,8 +15,8 @@ pub struct FittedValues {
     pub offset: bool,
     /// Cut-off frequencies of the front ends.
     pub cutoff: Option<Cutoff>,
-    /// The highest order of the static nonlinearity, by tones only.
-    pub nonlinearity: Option<usize>,
+    /// The kind of the static nonlinearity, by tones only.
+    pub nonlinearity: Option<CurveKind>,
 }
 
 impl Default for FittedValues {

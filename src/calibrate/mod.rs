@@ -44,12 +44,14 @@ mod fit;
 mod lags;
 mod model;
 mod order;
+mod reading;
 mod record;
 mod starts;
 #[cfg(test)]
 #[path = "tests/testbench.rs"]
 pub(crate) mod testbench;
 mod tones;
+mod track;
 mod warning;
 mod waveform;
 
@@ -60,12 +62,16 @@ pub use estimates::{Calibration, CalibrationTone, ChannelEstimate, applied};
 pub use fit::FittedValues;
 pub(crate) use lags::{Correlation, LagLine, interpolated, line, steadied, stretch};
 pub(crate) use model::ChannelModel;
+pub(crate) use reading::LevelCourses;
+pub use reading::{LevelChange, Reading};
 pub(crate) use record::longest_run;
 pub use record::{Acquisition, Record};
+pub use track::{ChannelChange, Track, track};
 pub use warning::CalibrationWarning;
 
 pub use crate::spec::{Cutoff, Fitting, UnknownFitting};
 
+use crate::runtime::Nonlinearity;
 use crate::spec::{Spec, UncertaintySpec};
 use crate::units::{FastPeriods, Hertz};
 use estimates::Fitted;
@@ -158,7 +164,7 @@ pub fn calibrate_pooled(
         None => fit(spec, None)?,
         // The tones of samples as they are tell the curves, and those of straight samples the values.
         Some(_) => {
-            let bent = with_nonlinearity(spec, vec![Vec::new(); spec.channels.len()]);
+            let bent = with_nonlinearity(spec, vec![Nonlinearity::default(); spec.channels.len()]);
             let curves = fit(&bent, order)?.curves;
             Fitted { curves: curves.clone(), ..fit(&with_nonlinearity(spec, curves), None)? }
         }
@@ -204,7 +210,7 @@ pub fn calibrate_pooled(
 }
 
 /// `spec` with other nonlinearities.
-fn with_nonlinearity(spec: &Spec, curves: Vec<Vec<f64>>) -> Spec {
+fn with_nonlinearity(spec: &Spec, curves: Vec<Nonlinearity>) -> Spec {
     let mut new = spec.clone();
     new.channels.iter_mut().zip(curves).for_each(|(channel, curve)| channel.nonlinearity = curve);
     new

@@ -2,7 +2,8 @@
 
 use super::CaptureError;
 use crate::bank::Bank;
-use crate::runtime::nonlinearity;
+use crate::calibrate::LevelChange;
+use crate::runtime::Nonlinearity;
 use crate::spec::{SpecProblem, check_gain, check_offset};
 use crate::units::Seconds;
 
@@ -19,28 +20,20 @@ pub struct LevelTrack {
     offsets: Vec<Vec<f64>>,
 }
 
-/// By how much the levels of some converter change.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct LevelChange {
-    /// Largest over least gain, less 1.
-    pub gain: f64,
-    /// Largest less least offset, of full scale.
-    pub offset: f64,
-}
-
 impl LevelTrack {
-    /// Of a bank at ascending times. Without `offsets` they are those of the bank.
+    /// Of a bank at ascending times. Without gains or offsets these are those of the bank.
     ///
     /// # Errors
     /// [`CaptureError::Level`] for a gain or an offset that no spec may have; [`CaptureError::Polarity`].
     pub fn new(
         bank: &Bank,
         times: Vec<Seconds>,
-        gains: Vec<Vec<f64>>,
+        gains: Option<Vec<Vec<f64>>>,
         offsets: Option<Vec<Vec<f64>>>,
     ) -> Result<Self, CaptureError> {
-        let of_bank = || bank.offsets.iter().map(|offset| vec![*offset; times.len()]).collect();
-        let offsets = offsets.unwrap_or_else(of_bank);
+        let steady = |values: &[f64]| values.iter().map(|value| vec![*value; times.len()]).collect();
+        let gains = gains.unwrap_or_else(|| steady(&bank.gains));
+        let offsets = offsets.unwrap_or_else(|| steady(&bank.offsets));
         check("gain", &gains, check_gain)?;
         check("offset", &offsets, check_offset)?;
         let changes_sign = |list: &Vec<f64>| list.iter().any(|gain| gain.signum() != list[0].signum());
@@ -50,10 +43,16 @@ impl LevelTrack {
         Ok(Self { bank: bank.clone(), times, gains, offsets })
     }
 
-    /// The bank for samples that have been [corrected](Self::correct).
+    /// The bank for samples that have been [corrected](Self::correct): how far its gains move is no
+    /// uncertainty of theirs.
     pub fn bank(&self) -> Bank {
         let channels = self.bank.channel_count();
-        Bank { nonlinearity: vec![Vec::new(); channels], offsets: vec![0.0; channels], ..self.bank.clone() }
+        let mut spec = self.bank.spec.clone();
+        if let Some(uncertainty) = spec.as_mut().and_then(|spec| spec.uncertainty.as_mut()) {
+            (uncertainty.gain, uncertainty.offset) = (None, None);
+        }
+        let nonlinearity = vec![Nonlinearity::default(); channels];
+        Bank { spec, nonlinearity, offsets: vec![0.0; channels], ..self.bank.clone() }
     }
 
     /// Takes nonlinearity and offset out of samples from frame `first` on, and gives them the gain of the
@@ -63,7 +62,7 @@ impl LevelTrack {
             let (curve, nominal) = (&self.bank.nonlinearity[i], self.bank.gains[i]);
             for (frame, x) in (first..).zip(samples) {
                 let time = self.bank.slow_period() * frame as f64;
-                let straight = *x - nonlinearity(curve, *x);
+                let straight = *x - curve.at(*x);
                 *x = (straight - self.at(time, &self.offsets[i])) * nominal / self.at(time, &self.gains[i]);
             }
         }
@@ -117,18 +116,18 @@ mod tests {
         (bank.gains, bank.offsets) = (vec![2.0], vec![0.5]);
         let times = || vec![Seconds(1.0), Seconds(3.0)];
         let track =
-            LevelTrack::new(&bank, times(), vec![vec![1.0, 2.0]], Some(vec![vec![0.0, 0.5]])).unwrap();
+            LevelTrack::new(&bank, times(), Some(vec![vec![1.0, 2.0]]), Some(vec![vec![0.0, 0.5]])).unwrap();
         let mut samples = [[1.0; 5].to_vec()];
         track.correct(0, &mut samples);
         assert_eq!(samples[0], [2.0, 2.0, 2.0 * 0.75 / 1.5, 0.5, 0.5]);
         assert_eq!(track.change(), LevelChange { gain: 1.0, offset: 0.5 });
         assert_eq!(track.bank().offsets, [0.0]);
-        let own = LevelTrack::new(&bank, times(), vec![vec![1.0, 2.0]], None).unwrap();
+        let own = LevelTrack::new(&bank, times(), Some(vec![vec![1.0, 2.0]]), None).unwrap();
         assert_eq!(own.change(), LevelChange { gain: 1.0, offset: 0.0 });
         let refused =
-            LevelTrack::new(&bank, times(), vec![vec![1.0, f64::NAN]], None).unwrap_err().to_string();
+            LevelTrack::new(&bank, times(), Some(vec![vec![1.0, f64::NAN]]), None).unwrap_err().to_string();
         assert!(refused.contains("gain of channel 1"), "{refused}");
-        let refused = LevelTrack::new(&bank, times(), vec![vec![1.0, -1.0]], None).unwrap_err();
+        let refused = LevelTrack::new(&bank, times(), Some(vec![vec![1.0, -1.0]]), None).unwrap_err();
         assert!(matches!(refused, CaptureError::Polarity { channel: 1 }));
     }
 }

@@ -29,4 +29,4 @@ pub use channel::ChannelSamples;
 pub use converters::{Converters, FileFormat};
 pub use error::CaptureError;
 pub use in_memory::Captures;
-pub use levels::{LevelChange, LevelTrack};
+pub use levels::LevelTrack;

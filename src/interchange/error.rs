@@ -146,7 +146,7 @@ pub enum ExportError {
 
 /// Refuses a bank that corrects nonlinearities.
 pub(super) fn check_straight(bank: &Bank) -> Result<(), ExportError> {
-    match bank.nonlinearity.iter().position(|curve| !curve.is_empty()) {
+    match bank.nonlinearity.iter().position(|curve| !curve.is_straight()) {
         Some(i) => Err(ExportError::Nonlinearity { channel: i + 1 }),
         None => Ok(()),
     }

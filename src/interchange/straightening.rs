@@ -3,6 +3,7 @@
 use super::ExportError;
 use super::bit_true::Range;
 use crate::bank::Bank;
+use crate::runtime::Nonlinearity;
 
 /// Bits of a word below a step of the samples. Rounding to them adds 1/64 of the noise of the samples' own
 /// rounding, 0.07 dB.
@@ -33,14 +34,14 @@ impl Straightening {
     /// # Errors
     /// [`ExportError::TableBits`] for more bits than a table has.
     pub(super) fn new(bank: &Bank, code_bits: u32) -> Result<Option<Self>, ExportError> {
-        if bank.nonlinearity.iter().all(Vec::is_empty) {
+        if bank.is_straight() {
             return Ok(None);
         }
         check_bits(code_bits, MOST_BITS)?;
         let tables: Vec<Option<Vec<i64>>> = bank
             .nonlinearity
             .iter()
-            .map(|curve| (!curve.is_empty()).then(|| table(curve, code_bits)))
+            .map(|curve| (!curve.is_straight()).then(|| table(curve, code_bits)))
             .collect();
         let word_bits =
             |table: &Vec<i64>| table.iter().map(|word| Range::from(i128::from(*word)).bits()).max();
@@ -83,10 +84,10 @@ pub(super) fn codes(bits: u32) -> std::ops::Range<i64> {
     -1 << (bits - 1)..1 << (bits - 1)
 }
 
-fn table(curve: &[f64], bits: u32) -> Vec<i64> {
+fn table(curve: &Nonlinearity, bits: u32) -> Vec<i64> {
     let full_scale = f64::from(bits - 1).exp2();
     let steps = f64::from(GUARD_BITS).exp2() * full_scale;
-    let word = |x: f64| ((x - crate::runtime::nonlinearity(curve, x)) * steps).round() as i64;
+    let word = |x: f64| ((x - curve.at(x)) * steps).round() as i64;
     codes(bits).map(|code| word(code as f64 / full_scale)).collect()
 }
 
@@ -98,7 +99,7 @@ mod tests {
     #[test]
     fn a_word_is_the_code_without_its_curve() {
         let mut bank = super::super::tests::integers(4, vec![vec![1, 2], vec![3, 4]]);
-        bank.nonlinearity[1] = vec![0.0625];
+        bank.nonlinearity[1] = Nonlinearity::Polynomial(vec![0.0625]);
         let straight = Straightening::new(&bank, 3).unwrap().unwrap();
         let by_hand = |code: i64| {
             let x = code as f64 / 4.0;

@@ -4,9 +4,11 @@ use super::expected::{Expected, Pattern};
 use super::lines::{FoundLine, Lines, fit_lines};
 use super::record::{Quadrature, RecordParts, UnsettledEnds};
 use super::{Cause, MeasureError, RecordSpectrum, Settings, Window};
-use crate::runtime::nonlinearity;
+use crate::runtime::Nonlinearity;
 use crate::sine_fit::SineFitError::{AtEdge, NoTone, TonesCoincide};
-use crate::sine_fit::{CurveFit, Estimate, Sense, SineFit, ToneFit, find_tones, fit, locate, with_lines};
+use crate::sine_fit::{
+    CurveFit, CurveKind, Estimate, Sense, SineFit, ToneFit, find_tones, fit, locate, with_lines,
+};
 use crate::units::{Decibels, Hertz, Radians};
 
 /// A tone that is given may be this far from the true one, in cycles per sample ..
@@ -204,7 +206,7 @@ fn straightened(
     let [samples] = record.parts() else { return None };
     let left = tones.residual(0, samples);
     let curve = |converter: usize| {
-        let mut fit = CurveFit::new(harmonics);
+        let mut fit = CurveFit::new(CurveKind::Order(harmonics));
         let length = samples.len().div_ceil(CURVE_PARTS);
         for first in (0..samples.len()).step_by(length) {
             let part = (first..samples.len().min(first + length)).filter(|n| n % converters == converter);
@@ -213,10 +215,9 @@ fn straightened(
         }
         fit.curve()
     };
-    let curves: Vec<Vec<f64>> = (0..converters).map(curve).collect();
-    let straight =
-        |(n, x): (usize, &f64)| x - full_scale * nonlinearity(&curves[n % converters], x / full_scale);
-    let is_bent = curves.iter().any(|curve| !curve.is_empty());
+    let curves: Vec<Nonlinearity> = (0..converters).map(curve).collect();
+    let straight = |(n, x): (usize, &f64)| x - full_scale * curves[n % converters].at(x / full_scale);
+    let is_bent = curves.iter().any(|curve| !curve.is_straight());
     is_bent.then(|| record.map(|_, part| part.iter().enumerate().map(straight).collect()))
 }
 

@@ -1,6 +1,10 @@
 //! What a reader of a measurement must know beside its figures.
 
 use super::{Cause, Measurement, Spur, UnsettledEnds};
+use crate::units::{Decibels, Hertz};
+
+/// No error of a converter that is in order is larger, relative to the tone.
+const LEAST_TONE: Decibels = Decibels(-20.0);
 
 /// Why figures may not say what they seem to say.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -39,6 +43,12 @@ pub enum MeasureWarning {
         .0.iter().map(shared).collect::<Vec<_>>().join("; ")
     )]
     Shared(Vec<Spur>),
+    /// Lines that nothing explains and that are nearly as large as the tone.
+    #[error(
+        "lines nearly as large as the tone count as its distortion: {}; if they were played, name all tones",
+        .0.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+    )]
+    OtherTones(Vec<Hertz>),
     /// The ends of the record hold most of the noise.
     #[error(
         "the first and the last {} samples raise the noise by {:.1} dB or more: a filter may not have settled there",
@@ -53,15 +63,23 @@ impl Measurement {
         let Self { samples, clipped, left_out, .. } = *self;
         let hidden = (!self.hidden.is_empty()).then(|| MeasureWarning::Hidden(self.hidden.clone()));
         let shared: Vec<Spur> = self.spurs.iter().filter(|spur| is_shared(spur)).cloned().collect();
+        let others: Vec<Hertz> =
+            self.spurs.iter().filter(|spur| is_tone(spur)).map(|spur| spur.frequency).collect();
         let all = [
             (clipped > 0).then_some(MeasureWarning::Clipped { clipped, samples }),
             (left_out > 0).then_some(MeasureWarning::LeftOut { left_out, samples }),
             hidden,
             (!shared.is_empty()).then_some(MeasureWarning::Shared(shared)),
+            (!others.is_empty()).then_some(MeasureWarning::OtherTones(others)),
             self.unsettled_ends.map(MeasureWarning::Unsettled),
         ];
         all.into_iter().flatten().collect()
     }
+}
+
+/// Whether a line is more likely another tone than an error of a converter.
+fn is_tone(spur: &Spur) -> bool {
+    spur.above_noise && spur.level > LEAST_TONE && spur.causes.iter().all(|cause| *cause == Cause::Unknown)
 }
 
 /// Whether interleaving may have part in a line that counts as something else.

@@ -62,7 +62,7 @@ impl TrackedFusion {
         let recordings: Vec<Recording> =
             (0..bank.channel_count()).map(recording).collect::<Result<_, MergeError>>()?;
         let settings = FusionSettings { first: FastPeriods(0.0), count: 0, reach: REACH };
-        let estimator = design::instants_estimator(bank, settings.longest(&recordings))?;
+        let estimator = design::instants_estimator(&with_instants(bank), settings.longest(&recordings))?;
         let fusion = LiveFusion::new(estimator, recordings, settings.first, REACH);
         let course = InnerCourse::new(bank.fast_period * fusion.block() as f64);
         Ok(Self { fusion, bank: bank.clone(), frames: 0, course })
@@ -94,6 +94,16 @@ impl TrackedFusion {
         let fused = fusion.finish(frames.saturating_mul(bank.ratio))?;
         Ok((course.judged(fused), course.quality()))
     }
+}
+
+/// The bank for samples whose instants are known: how uncertain the delays of its spec are, which may be how
+/// far they move, says nothing of them.
+fn with_instants(bank: &Bank) -> Bank {
+    let mut bank = bank.clone();
+    if let Some(uncertainty) = bank.spec.as_mut().and_then(|spec| spec.uncertainty.as_mut()) {
+        uncertainty.delay = None;
+    }
+    bank
 }
 
 /// Fuses the recordings of the converters of a bank, each sample of which has its time stamp; NaN where
@@ -134,7 +144,7 @@ pub fn fuse_stamped(
         Recording::new(samples.iter().map(|x| bank.corrected(i, *x)).collect(), clock, i)
     };
     let recordings: Vec<Recording> = channels.iter().enumerate().zip(clocks).map(recording).collect();
-    let estimator = design::instants_estimator(bank, settings.longest(&recordings))?;
+    let estimator = design::instants_estimator(&with_instants(bank), settings.longest(&recordings))?;
     let fused = fuse(&estimator, &recordings, settings)?;
     let mut course = InnerCourse::new(bank.fast_period * fused.block as f64);
     let samples = course.judged(fused);

@@ -4,7 +4,7 @@ use super::capture::{Analog, target};
 use super::normal::{Normal, Purpose};
 use super::response::Instants;
 use crate::design::Problem;
-use crate::runtime::nonlinearity;
+use crate::runtime::Nonlinearity;
 use crate::units::FastPeriods;
 use std::ops::Range;
 
@@ -19,8 +19,8 @@ const BENDING_STEPS: usize = 16;
 /// t_k = k T_i / (1 + drift) - D_i - delay error + jitter j_k
 /// ```
 ///
-/// with independent normal numbers n_k and j_k of variance 1, the quantiser q, and e(x) the sample y of
-/// which y - sum of a_k T_k(y) is x. The numbers depend on the seed, the channel and k only.
+/// with independent normal numbers n_k and j_k of variance 1, the quantiser q, and e(x) the sample y that is
+/// x without its nonlinearity. The numbers depend on the seed, the channel and k only.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sampler {
     /// The true delay minus D_i.
@@ -29,8 +29,8 @@ pub struct Sampler {
     pub gain_error: f64,
     /// What is added to each sample, relative to full scale.
     pub offset: f64,
-    /// a_2, a_3, .. of the static nonlinearity.
-    pub nonlinearity: Vec<f64>,
+    /// The static nonlinearity.
+    pub nonlinearity: Nonlinearity,
     /// By how much the clock is too fast, relatively.
     pub drift: f64,
     /// Rms of the aperture jitter.
@@ -65,7 +65,7 @@ impl Sampler {
             delay_error: FastPeriods(0.0),
             gain_error: 0.0,
             offset: 0.0,
-            nonlinearity: Vec::new(),
+            nonlinearity: Nonlinearity::default(),
             drift: 0.0,
             jitter: FastPeriods(0.0),
             noise: 0.0,
@@ -129,7 +129,7 @@ impl Sampler {
             if self.noise > 0.0 {
                 *x += self.noise * normal.at(k);
             }
-            if !self.nonlinearity.is_empty() {
+            if !self.nonlinearity.is_straight() {
                 *x = bent(&self.nonlinearity, *x);
             }
             if let Some(quantiser) = self.quantiser {
@@ -143,9 +143,9 @@ impl Sampler {
 }
 
 /// The y of which y less its nonlinearity is x. A step errs by what the slope of the curve leaves of the one
-/// before, a tenth at most.
-fn bent(coefficients: &[f64], x: f64) -> f64 {
-    (0..BENDING_STEPS).fold(x, |y, _| x + nonlinearity(coefficients, y))
+/// before, a tenth at most. Where a table leaves a gap between two cells it is in one of them.
+fn bent(nonlinearity: &Nonlinearity, x: f64) -> f64 {
+    (0..BENDING_STEPS).fold(x, |y, _| x + nonlinearity.at(y))
 }
 
 /// The instants of the samples of a converter, whose `samples` per frame these are, on its own time axis.

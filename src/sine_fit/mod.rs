@@ -38,6 +38,7 @@
 mod error;
 mod gauss_newton;
 mod nonlinearity;
+mod nonlinearity_table;
 mod normal;
 mod result;
 mod search;
@@ -46,7 +47,7 @@ mod tests;
 
 pub use error::SineFitError;
 pub use gauss_newton::{fit, fit_known};
-pub use nonlinearity::CurveFit;
+pub use nonlinearity::{CurveFit, CurveKind};
 pub(crate) use result::wrapped;
 pub use result::{ChannelFit, ComplexChannel, Component, Ratio, Sense, SineFit, ToneFit};
 pub(crate) use search::with_lines;

@@ -1,27 +1,89 @@
 //! The static nonlinearity of a converter from what sines leave of its samples.
 
+use super::nonlinearity_table::TableFit;
 use crate::linalg::Mat;
 use crate::linalg::least_squares::NormalEquations;
+use crate::runtime::Nonlinearity;
 
 /// A curve has to lower what is left of the parts left out by so many standard errors of that.
 const CLEAR_GAIN: f64 = 2.0;
 
-/// The equations of a curve sum of a_k T_k(x), k = 2 .. K, in parts of which each is left out in turn. What
-/// a fit of sines takes of the curve, its constant and the part along x, is free.
+/// What curve is fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CurveKind {
+    /// A polynomial up to this order.
+    Order(usize),
+    /// A value for each code.
+    Table,
+}
+
+/// The fit of a curve of some kind, in parts of which each is left out in turn.
 #[derive(Debug, Clone)]
-pub struct CurveFit {
-    order: usize,
-    parts: Vec<NormalEquations>,
+pub enum CurveFit {
+    /// Of a polynomial.
+    Polynomial(PolynomialFit),
+    /// Of a table.
+    Table(TableFit),
 }
 
 impl CurveFit {
-    /// Up to the order K.
-    pub fn new(order: usize) -> Self {
-        Self { order, parts: Vec::new() }
+    /// Without any samples.
+    pub fn new(kind: CurveKind) -> Self {
+        match kind {
+            CurveKind::Order(order) => Self::Polynomial(PolynomialFit::new(order)),
+            CurveKind::Table => Self::Table(TableFit::default()),
+        }
     }
 
     /// Adds a part: samples x, and what sines leave of them.
     pub fn add(&mut self, part: impl Iterator<Item = (f64, f64)>) {
+        match self {
+            Self::Polynomial(fit) => fit.add(part),
+            Self::Table(fit) => fit.add(part),
+        }
+    }
+
+    /// Adds the parts of another fit of the same kind.
+    pub fn join(&mut self, other: &Self) {
+        match (self, other) {
+            (Self::Polynomial(fit), Self::Polynomial(other)) => fit.parts.extend_from_slice(&other.parts),
+            (Self::Table(fit), Self::Table(other)) => fit.join(other),
+            _ => {}
+        }
+    }
+
+    /// The curve; none if it does not leave clearly less of the parts left out than a line does.
+    pub fn curve(&self) -> Nonlinearity {
+        match self {
+            Self::Polynomial(fit) => Nonlinearity::Polynomial(fit.curve()),
+            Self::Table(fit) => fit.curve(),
+        }
+    }
+}
+
+/// Whether a curve leaves clearly less of the parts left out than a line does.
+pub(super) fn is_clearly_less(line: &[f64], left: &[f64]) -> bool {
+    let gains: Vec<f64> = line.iter().zip(left).map(|(line, left)| line - left).collect();
+    let mean = gains.iter().sum::<f64>() / gains.len() as f64;
+    let spread = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>();
+    gains.iter().sum::<f64>() > CLEAR_GAIN * spread.sqrt()
+}
+
+/// The equations of a curve sum of a_k T_k(x), k = 2 .. K, in parts of which each is left out in turn. What
+/// a fit of sines takes of the curve, its constant and the part along x, is free.
+#[derive(Debug, Clone)]
+pub struct PolynomialFit {
+    order: usize,
+    parts: Vec<NormalEquations>,
+}
+
+impl PolynomialFit {
+    /// Up to the order K.
+    fn new(order: usize) -> Self {
+        Self { order, parts: Vec::new() }
+    }
+
+    fn add(&mut self, part: impl Iterator<Item = (f64, f64)>) {
         let mut equations = NormalEquations::new(self.order + 1);
         for (x, left) in part {
             equations.add(&chebyshev(x, self.order), left);
@@ -31,18 +93,14 @@ impl CurveFit {
 
     /// a_2, a_3, .. of the order that leaves least of the parts left out; none if that is not less than a
     /// line leaves.
-    pub fn curve(&self) -> Vec<f64> {
+    fn curve(&self) -> Vec<f64> {
         let line = self.left_out(1);
         let judged = (2..=self.order).map(|order| (order, self.left_out(order)));
         let total = |left: &[f64]| left.iter().sum::<f64>();
         let best = judged.min_by(|a, b| total(&a.1).total_cmp(&total(&b.1)));
-        let is_less = |left: &[f64]| {
-            let gains: Vec<f64> = line.iter().zip(left).map(|(line, left)| line - left).collect();
-            let mean = total(&gains) / gains.len() as f64;
-            let spread = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>();
-            total(&gains) > CLEAR_GAIN * spread.sqrt()
-        };
-        let solved = best.filter(|(_, left)| is_less(left)).and_then(|(order, _)| self.solved(order, None));
+        let solved = best
+            .filter(|(_, left)| is_clearly_less(&line, left))
+            .and_then(|(order, _)| self.solved(order, None));
         solved.map_or_else(Vec::new, |all| all.iter().skip(2).copied().collect())
     }
 
@@ -65,16 +123,6 @@ impl CurveFit {
             sum.projection += &part.projection;
         }
         sum.solve().ok()
-    }
-}
-
-/// The parts of several fits of one order.
-impl<'a> FromIterator<&'a CurveFit> for CurveFit {
-    fn from_iter<I: IntoIterator<Item = &'a Self>>(all: I) -> Self {
-        all.into_iter().fold(Self::new(0), |sum, one| Self {
-            order: sum.order.max(one.order),
-            parts: [sum.parts, one.parts.clone()].concat(),
-        })
     }
 }
 
@@ -107,7 +155,7 @@ mod tests {
         let truth = [3e-3, -1e-3, 0.0, 5e-4];
         let mut dice = Random(3);
         let mut fit = |curve: &[f64]| {
-            let mut fit = CurveFit::new(9);
+            let mut fit = PolynomialFit::new(9);
             for _ in 0..8 {
                 let one = |n: usize| {
                     let x = 0.9 * (0.37 * n as f64).sin();

@@ -111,7 +111,7 @@ fn the_samples_of_a_converter_share_its_errors() {
         spec: Some(own.per_sample()),
         gains: vec![1.0, 1.0, 1.0, 1.1, 1.1],
         offsets: vec![0.0; 5],
-        nonlinearity: vec![Vec::new(); 5],
+        nonlinearity: vec![hybank::runtime::Nonlinearity::default(); 5],
         ..bank.clone()
     };
     untied.check().unwrap();

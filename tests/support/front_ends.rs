@@ -54,7 +54,7 @@ pub(crate) fn bank(
         delays: delays.iter().copied().map(Seconds).collect(),
         gains: vec![1.0; delays.len()],
         offsets: vec![0.0; delays.len()],
-        nonlinearity: vec![Vec::new(); delays.len()],
+        nonlinearity: vec![hybank_core::runtime::Nonlinearity::default(); delays.len()],
         filters: SynthesisFilters::Fir((0..delays.len()).map(made_up).collect()),
         gamma: Gamma::default(),
         proof: None,

@@ -1,6 +1,6 @@
 //! Samples that were lost: what tells of them, what stands in for them, what they touch. As a user runs it.
 
-use crate::support::{Desk, bytes, channel, floats, frames, fused, wav, words};
+use crate::support::{Desk, bytes, channel, floats, frames, fused, number, text, wav, words};
 use serde_json::{Value, json};
 use trials::random::Random;
 
@@ -342,4 +342,70 @@ fn a_table_of_delays_is_followed() {
     let warnings = desk.report(&args)["warnings"].to_string();
     assert!(warnings.contains("clipped") && warnings.contains("--bits 32f"), "{warnings}");
     desk.refused(1, &[&args[..], &["--strict", "--force"]].concat(), &["clipped", "--strict"]);
+}
+
+/// A clock that is 3 ppm fast, a gain that grows by 1 % and an offset that grows by 0.5 %: calibrated while
+/// they change, by tones and by any signal, and corrected.
+#[test]
+fn what_changes_is_calibrated_and_corrected() {
+    let desk = two_converters("10us");
+    let simulate = "simulate bank.json --samples 96000 --drift 0,3 --gain 0.1 -o cap --force --source";
+    let tones = "440Hz,3.1kHz,7.3kHz,9.9kHz";
+    desk.good(&[&words(simulate)[..], &[&format!("tones:{tones}")]].concat());
+    let mut random = Random(8);
+    let files = ["a.wav", "b.wav"];
+    for (i, file) in files.iter().enumerate() {
+        let moved = |(frame, x): (usize, &f32)| {
+            let share = i as f64 * frame as f64 / 48e3;
+            ((1.0 + 0.01 * share) * f64::from(*x) + 0.005 * share + 1e-4 * random.sample()) as f32
+        };
+        let captured = wav::samples(&desk, &format!("cap/ch{}.wav", i + 1));
+        wav::write(&desk, file, 1, 24_000, &captured.iter().enumerate().map(moved).collect::<Vec<_>>());
+    }
+    let want = wav::samples(&desk, "cap/target.wav");
+    let calibrate = |more: &[&str]| {
+        let args = ["calibrate", "spec.toml", files[0], files[1], "-o", "m.toml", "--drift", "drift.jsonl"];
+        desk.json(&[&args[..], &["--force", "--json"], more].concat())
+    };
+    let snr = |table: &str| {
+        let args = ["fuse", "bank.json", files[0], files[1], "-o", "y.wav", "--force", "--track", table];
+        desk.good(&args);
+        let got = wav::samples(&desk, "y.wav");
+        let inner = 500..want.len() - 500;
+        let power: f64 = want[inner.clone()].iter().map(|x| f64::from(*x).powi(2)).sum();
+        let error: f64 = inner.map(|n| f64::from(got[n] - want[n]).powi(2)).sum();
+        10.0 * (power / error).log10()
+    };
+    for signal in [&["--tone", tones][..], &["--blind"]] {
+        let report = calibrate(signal);
+        let of = |key: &str, channel: usize| number(&report["drift"]["channels"][channel], key);
+        assert!((of("/gain", 1) - 0.01).abs() < 1e-3 && of("/gain", 0) == 0.0, "{report}");
+        assert!((of("/offset", 1) - 0.005).abs() < 5e-4, "{report}");
+        desk.good(&["design", "m.toml", "-o", "bank.json", "--no-proof", "--force"]);
+        let lines = text(&desk.read("drift.jsonl"));
+        let alone = lines.lines().map(|line| {
+            let line: Value = serde_json::from_str(line).unwrap();
+            json!({ "frame": line["frame"], "delay": line["delay"] }).to_string() + "\n"
+        });
+        desk.write("delays.jsonl", alone.collect::<String>());
+        let (delays, all) = (snr("delays.jsonl"), snr("drift.jsonl"));
+        println!("{signal:?}: SNR {delays:.1} dB with delays, {all:.1} dB with all");
+        assert!(all > delays + 10.0 && all > 50.0, "{delays} {all}");
+    }
+    let mixed = lines_without_gains(&text(&desk.read("drift.jsonl")));
+    desk.write("mixed.jsonl", mixed);
+    let args = ["fuse", "bank.json", files[0], files[1], "-o", "n.wav", "--track", "mixed.jsonl"];
+    desk.refused(1, &args, &["mixed.jsonl: line 2", "in all or in none"]);
+}
+
+/// The same lines, the second without its gains.
+fn lines_without_gains(lines: &str) -> String {
+    let line = |(number, line): (usize, &str)| {
+        let mut line: Value = serde_json::from_str(line).unwrap();
+        if number == 1 {
+            line.as_object_mut().unwrap().remove("gain");
+        }
+        line.to_string() + "\n"
+    };
+    lines.lines().enumerate().map(line).collect()
 }

@@ -1,7 +1,8 @@
 //! The static nonlinearity of converters: simulated, found by tones, and corrected before the filters.
 
 use crate::calibrate::design;
-use crate::support::{Desk, number, text};
+use crate::support::{Desk, number, text, wav};
+use hybank::runtime::Nonlinearity;
 use hybank::spec::Spec;
 
 /// Four interleaved converters of 250 MS/s and 12 bits.
@@ -32,7 +33,7 @@ fn bent() -> String {
     let mut spec = Spec::from_toml(NOMINAL, "spec.toml").unwrap();
     let shares = [[0.6, 0.3, -0.1], [-0.5, 0.4, 0.1], [0.2, -0.7, 0.1], [0.3, 0.5, -0.2]];
     for (channel, shares) in spec.channels.iter_mut().zip(shares) {
-        channel.nonlinearity = shares.map(|share| share * HALF_STEP).to_vec();
+        channel.nonlinearity = Nonlinearity::Polynomial(shares.map(|share| share * HALF_STEP).to_vec());
     }
     spec.to_toml_like(NOMINAL, &|_| unreachable!()).unwrap()
 }
@@ -84,7 +85,7 @@ fn a_nonlinearity_of_half_a_step_is_found_and_taken_out() {
     let found = Spec::from_toml(&String::from_utf8(desk.read("straight.toml")).unwrap(), "straight.toml");
     let truth = Spec::from_toml(&bent(), "bent.toml").unwrap();
     for (found, truth) in found.unwrap().channels.iter().zip(&truth.channels) {
-        let error = |k: usize| found.nonlinearity[k] - truth.nonlinearity[k];
+        let error = |k: usize| found.nonlinearity.values()[k] - truth.nonlinearity.values()[k];
         assert!((0..3).all(|k| error(k).abs() < 0.05 * HALF_STEP), "{report}");
     }
     design(&desk, "straight.toml");
@@ -99,4 +100,73 @@ fn a_nonlinearity_of_half_a_step_is_found_and_taken_out() {
     // Curves have no place in other tools.
     let refused = desk.run(&["export", "bank.json", "--format", "c", "-o", "bank.h"], &[]);
     assert!(!refused.status.success() && String::from_utf8_lossy(&refused.stderr).contains("nonlinearity"));
+}
+
+/// The codes of a converter of 8 bits by successive approximation, whose bits have errors of weight: its
+/// integral nonlinearity, without the line through it, is half a step at most.
+struct SuccessiveApproximation {
+    /// Least inputs of the codes, in steps.
+    thresholds: Vec<f64>,
+}
+
+impl SuccessiveApproximation {
+    fn new(errors: [f64; 8]) -> Self {
+        let of = |code: usize| (0..8).filter(|bit| code >> bit & 1 == 1).map(|bit| errors[bit]).sum::<f64>();
+        let codes: Vec<f64> = (0..256).map(|code| code as f64 - 127.5).collect();
+        let slope = codes.iter().enumerate().map(|(code, x)| of(code) * x).sum::<f64>()
+            / codes.iter().map(|x| x * x).sum::<f64>();
+        let mean = errors.iter().sum::<f64>() / 2.0;
+        let inl: Vec<f64> = (0..256).map(|code| of(code) - mean - slope * codes[code]).collect();
+        let scale = 0.5 / inl.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let threshold = |code: usize| code as f64 - 128.5 + 0.5 * scale * (inl[code] + inl[code - 1]);
+        Self { thresholds: (1..256).map(threshold).collect() }
+    }
+
+    fn sample(&self, x: f32) -> f32 {
+        let steps = 128.0 * f64::from(x);
+        (self.thresholds.partition_point(|threshold| *threshold <= steps) as f32 - 128.0) / 128.0
+    }
+}
+
+/// Nine tones tell the codes, and the tenth is corrected: of steps at the bits of a code a table takes out
+/// what no polynomial does.
+#[test]
+fn a_table_takes_out_the_steps_of_successive_approximation() {
+    let desk = Desk::with_spec(NOMINAL);
+    let converters = [
+        SuccessiveApproximation::new([0.1, -0.2, 0.1, 0.3, -0.4, 0.3, -0.2, 1.0]),
+        SuccessiveApproximation::new([0.0, 0.1, -0.2, 0.2, 0.3, -0.5, 0.8, -0.6]),
+        SuccessiveApproximation::new([0.1, 0.1, 0.2, -0.3, 0.2, 0.6, -0.9, 0.1]),
+        SuccessiveApproximation::new([-0.1, 0.2, 0.1, 0.1, -0.3, -0.4, 0.2, -0.9]),
+    ];
+    let capture = |tone: &str, folder: &str| -> [String; 4] {
+        let simulate = ["simulate", "spec.toml", "--source", tone, "--samples", "65536", "--gain", "0.9"];
+        desk.good(&[&simulate[..], &["--noise", "0.002", "--seed", "5", "-o", folder]].concat());
+        let files = four(folder);
+        for (file, converter) in files.iter().zip(&converters) {
+            let codes: Vec<f32> = wav::samples(&desk, file).iter().map(|x| converter.sample(*x)).collect();
+            wav::write(&desk, file, 1, 250_000_000, &codes);
+        }
+        files
+    };
+    let judged = capture("tones:61.37MHz", "judged");
+    let files: Vec<String> = (0..9)
+        .flat_map(|k| {
+            let tone = 23.17 + 41.37 * f64::from(k);
+            capture(&format!("tones:{tone}MHz"), &format!("tone{k}"))
+        })
+        .collect();
+    let names: Vec<&str> = files.iter().map(String::as_str).collect();
+    let sfdr = |more: &[&str]| {
+        let calibrate = ["calibrate", "spec.toml", "-o", "found.toml", "--force"];
+        let shown = desk.run(&[&calibrate[..], &names, more].concat(), &[]);
+        assert!(shown.status.success(), "{shown:?}");
+        design(&desk, "found.toml");
+        sfdr_by(&desk, &[])
+    };
+    let [raw, polynomial, table] =
+        [&[][..], &["--nonlinearity", "9"], &["--nonlinearity", "table"]].map(sfdr);
+    println!("SFDR {raw:.1} dB without, {polynomial:.1} dB with a polynomial, {table:.1} dB with a table");
+    assert_eq!(judged, four("judged"));
+    assert!(table > raw + 15.0 && table > polynomial + 3.0, "{raw} {polynomial} {table}");
 }

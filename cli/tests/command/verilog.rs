@@ -2,6 +2,7 @@
 
 use crate::support::{Desk, number, text};
 use hybank::bank::{Bank, FixedPoint, SynthesisFilters};
+use hybank::runtime::Nonlinearity;
 use hybank::spec::WordLengths;
 use serde_json::Value;
 use std::process::Command;
@@ -295,11 +296,16 @@ fn a_loadable_module_depends_on_no_tap() {
 fn tables_take_out_nonlinearities() {
     let desk = Desk::empty();
     let mut bank = bank_of_integers(vec![vec![5, -3, 0, 8, -16, 5], vec![-127, 0, 0, 127, 3, -1]], 8, 6, 2);
-    (bank.offsets, bank.nonlinearity) = (vec![0.03, -0.02], vec![vec![0.01, -0.004], Vec::new()]);
-    desk.write("b.json", bank.to_json().unwrap());
-    for flags in
+    let codes = (0..256).map(|code| 0.004 * f64::from(code % 16) - 0.03).collect();
+    let curves = [Nonlinearity::Polynomial(vec![0.01, -0.004]), Nonlinearity::Table { table: codes }];
+    bank.offsets = vec![0.03, -0.02];
+    for (flags, curve) in
         [&[][..], &["--clocks-per-frame", "3"], &["--frames-per-clock", "2"], &["--accumulator", "16"]]
+            .into_iter()
+            .zip(curves.iter().cycle())
     {
+        bank.nonlinearity = vec![curve.clone(), Nonlinearity::default()];
+        desk.write("b.json", bank.to_json().unwrap());
         let report = exported(&desk, &[&["--input-bits", "8"], flags].concat());
         let core = text(&desk.read("core.v"));
         if let Some((is_good, said)) = tool(&desk, &["verilator", "--lint-only", "-Wall", "core.v"]) {

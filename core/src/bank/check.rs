@@ -199,6 +199,7 @@ impl Bank {
             agree(&path("offset"), self.offsets[i], channel.offset, channel.offset.abs())?;
             let (own, other) = (&self.nonlinearity[i], &channel.nonlinearity);
             let rule = "the spec must have the nonlinearity of the bank";
+            let (own, other) = (own.values(), other.values());
             check_length(&path("nonlinearity"), own.len(), other.len(), "coefficients", rule)?;
             own.iter().zip(other).try_for_each(|(a, b)| agree(&path("nonlinearity"), *a, *b, b.abs()))?;
         }

@@ -7,6 +7,7 @@ use super::check::check_length;
 use super::digest::{check_form, digest};
 use super::{Bank, FORMAT, FixedPoint, Gamma, Proof, StateMatrices, SynthesisFilters, VERSION, layout};
 use crate::messages::{Quoted, of_json};
+use crate::runtime::Nonlinearity;
 use crate::spec::{
     At, DesignOverrides, Method, OneOrEach, Refusal, Spec, SpecProblem, SpecTable, no_models, refusal,
     refused,
@@ -49,8 +50,8 @@ struct ConverterTable {
     gain: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     offset: Option<f64>,
-    #[serde(skip_serializing_if = "Vec::is_empty", default)]
-    nonlinearity: Vec<f64>,
+    #[serde(skip_serializing_if = "Nonlinearity::is_straight", default)]
+    nonlinearity: Nonlinearity,
     #[serde(skip_serializing_if = "Option::is_none")]
     taps: Option<TapLists>,
 }

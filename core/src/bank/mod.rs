@@ -22,7 +22,7 @@ pub use taps::FixedPoint;
 pub use crate::runtime::StateMatrices;
 pub use crate::spec::{FrameLayout, FrameSample};
 
-use crate::runtime::{BuildError, Options, Plan, Shape, nonlinearity};
+use crate::runtime::{BuildError, Nonlinearity, Options, Plan, Shape};
 use crate::spec::{ErrorPoint, Method, Spec};
 use crate::units::{FastPeriods, GridTime, Seconds};
 
@@ -56,9 +56,8 @@ pub struct Bank {
     /// The offset o_i of each converter, relative to full scale. It is subtracted from the samples before
     /// the filters.
     pub offsets: Vec<f64>,
-    /// The static nonlinearity of each converter: a_k from k = 2 on of the sum of a_k T_k(x) that its sample
-    /// x contains, which is subtracted before the filters.
-    pub nonlinearity: Vec<Vec<f64>>,
+    /// The static nonlinearity of each converter, which is subtracted from its samples before the filters.
+    pub nonlinearity: Vec<Nonlinearity>,
     /// The synthesis filters, one for each sample of a frame.
     pub filters: SynthesisFilters,
     /// The integers of the taps, if the taps are fixed-point numbers.
@@ -143,7 +142,7 @@ impl Bank {
             delays: vec![Seconds(0.0); channels],
             gains: vec![1.0; channels],
             offsets: vec![0.0; channels],
-            nonlinearity: vec![Vec::new(); channels],
+            nonlinearity: vec![Nonlinearity::default(); channels],
             filters,
             fixed_point: None,
             gamma: Gamma::default(),
@@ -255,7 +254,7 @@ impl Bank {
     }
 
     /// The nonlinearity of each sample of a frame; nothing if no converter has one.
-    fn corrected_curves(&self) -> Vec<Vec<f64>> {
+    fn corrected_curves(&self) -> Vec<Nonlinearity> {
         match self.is_straight() {
             true => Vec::new(),
             false => self.layout().each(&self.nonlinearity),
@@ -264,12 +263,12 @@ impl Bank {
 
     /// A sample of a converter without its nonlinearity and its offset, as plans correct it.
     pub fn corrected(&self, converter: usize, x: f64) -> f64 {
-        x - nonlinearity(&self.nonlinearity[converter], x) - self.offsets[converter]
+        x - self.nonlinearity[converter].at(x) - self.offsets[converter]
     }
 
     /// Whether no converter has a nonlinearity that is corrected.
     pub fn is_straight(&self) -> bool {
-        self.nonlinearity.iter().all(Vec::is_empty)
+        self.nonlinearity.iter().all(Nonlinearity::is_straight)
     }
 }
 

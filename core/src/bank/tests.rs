@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::runtime::Nonlinearity;
 use crate::spec::{Refusal, WordLengths};
 use crate::units::Seconds;
 
@@ -23,7 +24,7 @@ fn fir() -> Bank {
         delays: vec![Seconds(1.2), Seconds(0.6)],
         gains: vec![1.0; 2],
         offsets: vec![0.0; 2],
-        nonlinearity: vec![Vec::new(); 2],
+        nonlinearity: vec![Nonlinearity::default(); 2],
         filters: SynthesisFilters::Fir(vec![vec![0.1, -2.5e-9, 1.0 / 3.0], vec![5e-324, -0.0, 1.7e149]]),
         gamma: Gamma { upper: Some(0.0399320), noncausal: Some(0.03), ..Gamma::default() },
         proof: None,
@@ -381,7 +382,11 @@ proptest! {
         let offsets = taps.iter().map(|list| list[2] % 1.0).collect();
         let gamma = Gamma { upper: gamma, ..Gamma::default() };
         let samples = vec![1; taps.len()];
-        let nonlinearity = taps.iter().map(|list| vec![list[3] % 0.1; list[4].to_bits() as usize % 3]).collect();
+        let curve = |list: &Vec<f64>| match list[4].to_bits() as usize % 4 {
+            3 => Nonlinearity::Table { table: vec![list[3] % 0.1; 16] },
+            count => Nonlinearity::Polynomial(vec![list[3] % 0.1; count]),
+        };
+        let nonlinearity = taps.iter().map(curve).collect();
         let filters = SynthesisFilters::Fir(taps.clone());
         let fast_period = Seconds(fast_period);
         let converters = Bank { delays, gains, offsets, nonlinearity, samples, ..fir() };

@@ -1,12 +1,13 @@
 //! New values in the text of a spec file, with everything else kept: comments, layout, units.
 
 use toml_edit::visit_mut::{VisitMut, visit_table_like_kv_mut};
-use toml_edit::{Array, DocumentMut, Item, KeyMut, Table, TableLike, Value};
+use toml_edit::{Array, DocumentMut, InlineTable, Item, KeyMut, Table, TableLike, Value};
 
 use super::{
     ChannelSpec, DesignOverrides, FilterModel, FilterModels, FilterSpec, MeasuredFilter, OneOrEach, Spec,
     SpecError, UncertaintySpec,
 };
+use crate::runtime::Nonlinearity;
 use crate::units::{Decibels, Seconds};
 
 /// Largest relative difference of two delays that differ only by the rounding of their unit.
@@ -101,7 +102,7 @@ impl ChannelSpec {
             }
         }
         if self.nonlinearity != old.nonlinearity {
-            set(table, "nonlinearity", self.nonlinearity.iter().copied().map(number).collect());
+            set(table, "nonlinearity", written_nonlinearity(&self.nonlinearity));
         }
         if self.filter != old.filter {
             set(table, "filter", inline(&self.filter)?);
@@ -212,6 +213,14 @@ fn replace(item: &mut Item, mut value: Value) {
 /// A number as TOML reads it back to the same bits, with an exponent where there would be many zeros.
 fn number(value: f64) -> Value {
     format!("{value:?}").parse().unwrap_or_else(|_| value.into())
+}
+
+fn written_nonlinearity(nonlinearity: &Nonlinearity) -> Value {
+    let values: Value = nonlinearity.values().iter().copied().map(number).collect();
+    match nonlinearity {
+        Nonlinearity::Polynomial(_) => values,
+        Nonlinearity::Table { .. } => InlineTable::from_iter([("table", values)]).into(),
+    }
 }
 
 fn written(values: &OneOrEach<f64>) -> Value {

@@ -1,6 +1,7 @@
 //! Ranges of the numbers in a spec, each with its reason.
 
 use super::{FrameLayout, SpecProblem};
+use crate::runtime::Nonlinearity;
 use crate::units::{FastPeriods, Hertz, Seconds};
 use std::ops::RangeInclusive;
 
@@ -187,16 +188,29 @@ pub fn check_gain(gain: f64) -> Result<(), SpecProblem> {
 
 /// Most coefficients of a nonlinearity: beyond them the polynomial follows single codes.
 const MAX_NONLINEARITY: usize = 31;
+/// Entries of the table of a nonlinearity: those of 4 to 12 bits.
+const TABLE_ENTRIES: RangeInclusive<usize> = 16..=4096;
 
-/// a_k: a curve that moves samples by more than a tenth of full scale is no error of a converter.
+/// A curve that moves samples by more than a tenth of full scale is no error of a converter.
 ///
 /// # Errors
-/// [`SpecProblem`] for too many coefficients, or one that is too large.
-pub fn check_nonlinearity(coefficients: &[f64]) -> Result<(), SpecProblem> {
-    let rule = format!("give the coefficients of T_2, T_3, .., at most {MAX_NONLINEARITY} of them");
-    within(coefficients.len() as f64, 0.0..=MAX_NONLINEARITY as f64, "coefficients", rule)?;
-    let rule = "a coefficient is relative to full scale, -0.1 to 0.1; of 12 bits half a step is 0.00024";
-    coefficients.iter().try_for_each(|&a| within(a, -0.1..=0.1, "of full scale", rule))
+/// [`SpecProblem`] for too many coefficients or entries, or one that is too large.
+pub fn check_nonlinearity(nonlinearity: &Nonlinearity) -> Result<(), SpecProblem> {
+    let values = nonlinearity.values();
+    match nonlinearity {
+        Nonlinearity::Polynomial(_) => {
+            let rule = format!("give the coefficients of T_2, T_3, .., at most {MAX_NONLINEARITY} of them");
+            within(values.len() as f64, 0.0..=MAX_NONLINEARITY as f64, "coefficients", rule)?;
+        }
+        Nonlinearity::Table { .. } => {
+            let is_table = values.len().is_power_of_two() && TABLE_ENTRIES.contains(&values.len());
+            let rule = "a table has an entry for each of 2^b equal parts from -1 to 1, b from 4 to 12";
+            is_table.then_some(()).ok_or_else(|| range(values.len() as f64, "entries", rule.to_owned()))?;
+        }
+    }
+    let rule =
+        "a coefficient or entry is relative to full scale, -0.1 to 0.1; of 12 bits half a step is 0.00024";
+    values.iter().try_for_each(|&a| within(a, -0.1..=0.1, "of full scale", rule))
 }
 
 /// o_i: a converter whose offset exceeds full scale delivers nothing but clipped samples.

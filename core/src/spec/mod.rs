@@ -54,6 +54,7 @@ pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 
 use crate::quantity::{self, FullScale};
+use crate::runtime::Nonlinearity;
 use crate::units::{FastPeriods, GridTime, Hertz, Seconds};
 use serde::{Deserializer, Serialize, Serializer};
 use std::collections::BTreeMap;
@@ -124,10 +125,9 @@ pub struct ChannelSpec {
     /// o_i: the converter's offset, relative to full scale.
     #[serde(skip_serializing_if = "is_zero")]
     pub offset: f64,
-    /// a_k from k = 2 on: a sample x also contains the sum of a_k T_k(x), with Chebyshev's polynomials,
-    /// which is subtracted before anything else.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub nonlinearity: Vec<f64>,
+    /// What a sample also contains, which is subtracted before anything else.
+    #[serde(skip_serializing_if = "Nonlinearity::is_straight")]
+    pub nonlinearity: Nonlinearity,
 }
 
 impl ChannelSpec {
@@ -142,7 +142,7 @@ impl ChannelSpec {
             jitter: Seconds(0.0),
             gain: 1.0,
             offset: 0.0,
-            nonlinearity: Vec::new(),
+            nonlinearity: Nonlinearity::default(),
         }
     }
 
@@ -160,7 +160,7 @@ impl ChannelSpec {
 
     /// The sample that is left of `x` without the nonlinearity.
     pub fn straightened(&self, x: f64) -> f64 {
-        x - hybank_runtime::nonlinearity(&self.nonlinearity, x)
+        x - self.nonlinearity.at(x)
     }
 
     /// Rms of the noise and of the rounding together, relative to full scale.

@@ -11,6 +11,7 @@ use super::{
     SignalSpectrum, Spec, SpecError, SpecProblem, USUAL_RMS, UncertaintySpec, frames, limits,
 };
 use crate::quantity::{FullScale, Rate, Share, WrittenTime};
+use crate::runtime::Nonlinearity;
 use crate::units::{Decibels, FastPeriods, Hertz, Seconds};
 
 /// Errors of models below this, in decibels, are not carried into the uncertainty: 1.2e-4 of the gain.
@@ -52,7 +53,7 @@ pub(super) struct ChannelTable {
     jitter: Option<WrittenTime>,
     gain: Option<f64>,
     offset: Option<f64>,
-    nonlinearity: Vec<f64>,
+    nonlinearity: Nonlinearity,
 }
 
 #[derive(Default, Deserialize)]

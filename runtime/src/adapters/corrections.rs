@@ -2,6 +2,7 @@
 //! the kernels.
 
 use super::FrameSource;
+use super::nonlinearity::{Nonlinearity, polynomial};
 use crate::{BuildError, Isa, Sample};
 
 /// Samples after which the pattern of offsets repeats, at least: long enough for whole vectors.
@@ -20,6 +21,8 @@ struct Patterns<T> {
     offsets: Vec<T>,
     /// a_k of the channels, from T_2 on; none if all are zero.
     orders: Vec<Vec<T>>,
+    /// The tables of the channels, empty of those that have none; nothing if none has one.
+    tables: Vec<Vec<T>>,
 }
 
 impl Corrections {
@@ -30,7 +33,7 @@ impl Corrections {
     /// unless there is none at all; [`BuildError::NotFinite`].
     pub(crate) fn new(
         offsets: &[f64],
-        nonlinearity: &[Vec<f64>],
+        nonlinearity: &[Nonlinearity],
         channels: usize,
     ) -> Result<Option<Self>, BuildError> {
         if offsets.len() != channels {
@@ -40,18 +43,32 @@ impl Corrections {
             return Err(BuildError::OffsetCount { offsets: nonlinearity.len(), channels });
         }
         check_finite("the offsets of the channels", offsets)?;
-        nonlinearity.iter().try_for_each(|list| check_finite("the nonlinearity of a channel", list))?;
-        let count = nonlinearity.iter().map(Vec::len).max().unwrap_or(0);
-        let of_order = |k: usize| nonlinearity.iter().map(move |list| list.get(k).copied().unwrap_or(0.0));
+        let of = |one: &Nonlinearity| check_finite("the nonlinearity of a channel", one.values());
+        nonlinearity.iter().try_for_each(of)?;
+        let lists: Vec<&[f64]> = nonlinearity.iter().map(coefficients).collect();
+        let count = lists.iter().map(|list| list.len()).max().unwrap_or(0);
+        let of_order = |k: usize| lists.iter().map(move |list| list.get(k).copied().unwrap_or(0.0));
         let orders: Vec<Vec<f64>> = (0..count).map(|k| of_order(k).collect()).collect();
-        if offsets.iter().chain(orders.iter().flatten()).all(|&x| x == 0.0) {
+        let tables: Vec<Vec<f64>> = nonlinearity.iter().map(|one| table(one).to_vec()).collect();
+        if offsets.iter().chain(orders.iter().chain(&tables).flatten()).all(|&x| x == 0.0) {
             return Ok(None);
         }
+        let tables = if tables.iter().all(Vec::is_empty) { Vec::new() } else { tables };
         let repeated = |values: &[f64]| values.repeat(PATTERN.div_ceil(channels));
-        let double =
-            Patterns { offsets: repeated(offsets), orders: orders.iter().map(|a| repeated(a)).collect() };
+        let orders = orders.iter().map(|a| repeated(a)).collect();
+        let double = Patterns { offsets: repeated(offsets), orders, tables };
         Ok(Some(Self { single: double.rounded(), double }))
     }
+}
+
+/// The coefficients of a polynomial.
+fn coefficients(nonlinearity: &Nonlinearity) -> &[f64] {
+    if let Nonlinearity::Polynomial(list) = nonlinearity { list } else { &[] }
+}
+
+/// The entries of a table.
+fn table(nonlinearity: &Nonlinearity) -> &[f64] {
+    if let Nonlinearity::Table { table } = nonlinearity { table } else { &[] }
 }
 
 fn check_finite(location: &str, values: &[f64]) -> Result<(), BuildError> {
@@ -66,7 +83,11 @@ fn check_finite(location: &str, values: &[f64]) -> Result<(), BuildError> {
 impl Patterns<f64> {
     fn rounded(&self) -> Patterns<f32> {
         let rounded = |values: &Vec<f64>| values.iter().map(|&x| f32::from_f64(x)).collect();
-        Patterns { offsets: rounded(&self.offsets), orders: self.orders.iter().map(rounded).collect() }
+        Patterns {
+            offsets: rounded(&self.offsets),
+            orders: self.orders.iter().map(rounded).collect(),
+            tables: self.tables.iter().map(rounded).collect(),
+        }
     }
 }
 
@@ -74,31 +95,22 @@ impl<T: Sample> Patterns<T> {
     /// Subtracts the patterns from whole frames: first the nonlinearity at the sample as it is.
     fn subtract(&self, samples: &mut [T]) {
         for part in samples.chunks_mut(self.offsets.len()) {
-            if !self.orders.is_empty() {
-                let curve = |n: usize, x: T| curve(self.orders.iter().map(|a| a[n]), x);
-                part.iter_mut().enumerate().for_each(|(n, sample)| *sample = *sample - curve(n, *sample));
+            if !self.orders.is_empty() || !self.tables.is_empty() {
+                part.iter_mut()
+                    .enumerate()
+                    .for_each(|(n, sample)| *sample = *sample - self.curve(n, *sample));
             }
             part.iter_mut().zip(&self.offsets).for_each(|(sample, &offset)| *sample = *sample - offset);
         }
     }
-}
 
-/// What a converter with the static nonlinearity a_2, a_3, .. adds to a sample: the sum of a_k T_k(x).
-pub fn nonlinearity(coefficients: &[f64], x: f64) -> f64 {
-    curve(coefficients.iter().copied(), x)
-}
-
-/// The sum of a_k T_k(x) from k = 2 on by Clenshaw's recurrence, at the ends of -1 .. 1 for what is beyond.
-fn curve<T: Sample>(coefficients: impl DoubleEndedIterator<Item = T>, x: T) -> T {
-    let one = T::from_f64(1.0);
-    let x = if x > one { one } else { x };
-    let x = if x < T::from_f64(-1.0) { T::from_f64(-1.0) } else { x };
-    let (zero, twice) = (T::from_f64(0.0), x + x);
-    let next = |(b1, b2): (T, T), a: T| (a + twice * b1 - b2, b1);
-    let sums = coefficients.rev().fold((zero, zero), next);
-    // a_1 and a_0 are zero.
-    let (b1, b2) = next(sums, zero);
-    x * b1 - b2
+    /// The nonlinearity of sample n of the pattern; a converter has coefficients or a table.
+    fn curve(&self, n: usize, x: T) -> T {
+        match self.tables.get(n % self.tables.len().max(1)) {
+            Some(table) if !table.is_empty() => table[Nonlinearity::cell(table.len(), x.to_f64())],
+            _ => polynomial(self.orders.iter().map(|a| a[n]), x),
+        }
+    }
 }
 
 /// The frames of an input without offsets and nonlinearities. What is not finite stays so.

@@ -8,12 +8,13 @@
 
 mod corrections;
 mod in_memory;
+mod nonlinearity;
 mod pcm;
 mod side_by_side;
 
-pub use corrections::nonlinearity;
 pub(crate) use corrections::{Corrected, Corrections};
 pub use in_memory::{Interleaved, Planar};
+pub use nonlinearity::Nonlinearity;
 pub use pcm::PcmOutput;
 pub use side_by_side::SideBySide;
 

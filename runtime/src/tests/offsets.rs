@@ -3,8 +3,8 @@
 
 use super::support::{FIR_ALGORITHMS, Noise, fir_bank, precise, random_taps, recursive_bank};
 use crate::{
-    Algorithm, BuildError, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision, SampleLayout,
-    SideBySide, StateMatrices, Stream,
+    Algorithm, BuildError, Nonlinearity, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Planar, Precision,
+    SampleLayout, SideBySide, StateMatrices, Stream,
 };
 
 /// Frames of a test: more than two batches of overlap-save with transforms of 64 frames.
@@ -171,7 +171,7 @@ fn offsets_that_do_not_fit_are_refused() {
 /// By the definition of Chebyshev's polynomials, cos(k acos x), in both number types.
 #[test]
 fn nonlinearities_are_subtracted_at_the_sample_as_it_is() {
-    let curves = vec![vec![1e-3, -2e-3, 0.0, 5e-4], vec![], vec![-4e-3]];
+    let curves = [vec![1e-3, -2e-3, 0.0, 5e-4], vec![], vec![-4e-3]];
     let offsets = [0.01, 0.0, -0.02];
     let frames: Vec<f64> = (0..3 * 200).map(|n| 1.1 * (0.37 * f64::from(n)).sin()).collect();
     let straight = |(n, &x): (usize, &f64)| {
@@ -183,7 +183,8 @@ fn nonlinearities_are_subtracted_at_the_sample_as_it_is() {
     let taps = vec![vec![0.5, 0.25, -0.125]; 3];
     let options = Options { precision: Precision::Double, ..Options::default() };
     let plain = Plan::from_taps(&taps, 2, 0, options).unwrap();
-    let corrected = plain.clone().with_corrections(&offsets, &curves).unwrap();
+    let polynomials: Vec<_> = curves.iter().cloned().map(Nonlinearity::Polynomial).collect();
+    let corrected = plain.clone().with_corrections(&offsets, &polynomials).unwrap();
     let run = |plan: Plan, frames: &[f64]| -> Vec<f64> {
         let mut output = vec![0.0; 400];
         Stream::new(&plan).process(frames, &mut output).unwrap();
@@ -191,4 +192,27 @@ fn nonlinearities_are_subtracted_at_the_sample_as_it_is() {
     };
     let (got, want) = (run(corrected, &frames), run(plain, &expected));
     assert!(got.iter().zip(&want).all(|(got, want)| (got - want).abs() < 1e-15), "{got:?} {want:?}");
+}
+
+/// Each code of 4 bits has its own entry, whatever rounding has done to it, and what is beyond that of the
+/// end. Another channel has a polynomial.
+#[test]
+fn tables_are_subtracted_by_the_code_of_a_sample() {
+    let table: Vec<f64> = (0..16).map(|code| 1e-3 * f64::from(code * code)).collect();
+    let curves = [Nonlinearity::Table { table: table.clone() }, Nonlinearity::Polynomial(vec![0.01])];
+    let taps = vec![vec![1.0]; 2];
+    for precision in [Precision::Single, Precision::Double] {
+        let options = Options { precision, ..Options::default() };
+        let plan = Plan::from_taps(&taps, 1, 0, options).unwrap();
+        let plan = plan.with_corrections(&[0.0, 0.0], &curves).unwrap();
+        for code in -12..12 {
+            let x = f64::from(code) / 8.0 * (1.0 - 1e-7);
+            let entry = table[(code + 8).clamp(0, 15) as usize];
+            let mut output = [0.0];
+            Stream::new(&plan).process(&[x, 0.5], &mut output).unwrap();
+            // T_2(0.5) is -0.5.
+            let want = x - entry + 0.505;
+            assert!((output[0] - want).abs() < 1e-6 && curves[0].at(x) == entry, "{code}: {output:?} {want}");
+        }
+    }
 }

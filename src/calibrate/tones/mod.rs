@@ -28,7 +28,10 @@ use super::order::{Distances, other_order};
 use super::record::Acquisition;
 use super::warning::CalibrationWarning;
 use crate::linalg::Complex;
-use crate::sine_fit::{self, ChannelFit as SineChannel, CurveFit, Estimate, Sense, SineFit, alias};
+use crate::runtime::Nonlinearity;
+use crate::sine_fit::{
+    self, ChannelFit as SineChannel, CurveFit, CurveKind, Estimate, Sense, SineFit, alias,
+};
 use crate::spec::Spec;
 use crate::units::{Decibels, Hertz};
 use ambiguity::{ObservedTone, zone_of};
@@ -64,9 +67,9 @@ pub(super) fn fit(
         let captures = ToneRecords::new(one.records, &layout);
         let held = held(model, &captures, given, acquisitions.len() > 1)?;
         let mut tones = Tones::measure(model, &of_frames, &captures, &held, settings.reference)?;
-        if let Some(order) = settings.fit.nonlinearity {
+        if let Some(kind) = settings.fit.nonlinearity {
             let parts = if acquisitions.len() == 1 { PARTS } else { 1 };
-            tones.curves = captures.curves(&tones.sines, order, parts);
+            tones.curves = captures.curves(&tones.sines, kind, parts);
         }
         Ok(tones)
     };
@@ -216,16 +219,18 @@ impl ToneRecords<'_> {
 }
 
 /// The nonlinearity of a converter from all acquisitions, if it was asked for.
-fn curve(all: &[Tones], converter: usize) -> Option<Vec<f64>> {
-    let fits = all.iter().map(|tones| tones.curves.get(converter));
-    Some(fits.collect::<Option<CurveFit>>()?.curve())
+fn curve(all: &[Tones], converter: usize) -> Option<Nonlinearity> {
+    let mut fits = all.iter().map(|tones| tones.curves.get(converter));
+    let mut sum = fits.next()??.clone();
+    fits.flatten().for_each(|fit| sum.join(fit));
+    Some(sum.curve())
 }
 
 impl ToneRecords<'_> {
     /// The equations of the nonlinearity of each converter, its records cut into so many parts.
-    fn curves(&self, sines: &SineFit, order: usize, parts: usize) -> Vec<CurveFit> {
+    fn curves(&self, sines: &SineFit, kind: CurveKind, parts: usize) -> Vec<CurveFit> {
         let of_converter = |converter: usize| {
-            let mut fit = CurveFit::new(order);
+            let mut fit = CurveFit::new(kind);
             for (part, i) in self.records_of(converter).flat_map(|i| self.parts(i).map(move |part| (part, i)))
             {
                 let record = &self.records[i];

@@ -521,3 +521,22 @@ fn a_static_nonlinearity_is_told_from_noise() {
     let found = measure(&bent([0.0, 0.0], &mut random), RATE, &settings).unwrap();
     assert_eq!(found.thd_straightened, None);
 }
+
+/// Two tones of which one is measured are named, and an error of a converter is none.
+#[test]
+fn other_tones_are_named() {
+    let measured = |level: f64, tones: &[Hertz]| {
+        let sample = |n: usize| 0.4 * (0.7317 * n as f64).sin() + 0.4 * level * (1.91 * n as f64).sin();
+        let samples: Vec<f64> = (0..8192).map(sample).collect();
+        let settings = Settings { tones: tones.to_vec(), ..Settings::default() };
+        measure(&samples, RATE, &settings).unwrap().warnings()
+    };
+    let other = RATE * (1.91 / TAU);
+    let named = measured(0.9, &[]);
+    assert!(
+        matches!(&named[..], [MeasureWarning::OtherTones(list)] if (list[0] - other).0.abs() < 1e3),
+        "{named:?}"
+    );
+    assert_eq!(measured(0.05, &[]), []);
+    assert_eq!(measured(0.9, &[RATE * (0.7317 / TAU), other]), []);
+}

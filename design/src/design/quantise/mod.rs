@@ -65,7 +65,7 @@ pub struct WordLoss {
 
 /// Integer taps that were chosen for a loss of SNR: of the whole error, the mean square of the error for the
 /// signal and of the converters' noise at the output, relative to that of the real taps.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct WordChoice {
     /// The most that may be lost, in decibels.
     pub allowed_db: f64,
@@ -73,6 +73,19 @@ pub struct WordChoice {
     pub snr_loss_db: f64,
     /// Taps that are zero in all channels.
     pub taps_left_out: usize,
+    /// The others, by their bits.
+    pub taps: Vec<TapsOfBits>,
+    /// Sum of the bits of all taps of a channel.
+    pub bits_per_channel: u32,
+}
+
+/// How many taps of a channel have words of some bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct TapsOfBits {
+    /// Bits.
+    pub bits: u32,
+    /// Number of the taps.
+    pub taps: usize,
 }
 
 impl WordStudy {
