@@ -1,6 +1,6 @@
 //! A covariance as a function of the time between two samples.
 
-use hybank_linalg::{Complex, Mat};
+use hybank_linalg::{CMat, Complex, Mat};
 use std::f64::consts::{PI, TAU};
 
 /// Points of the table per period of the highest frequency. Interpolation by twelve points errs by 2e-15 of
@@ -32,33 +32,29 @@ pub(super) struct Covariance {
 #[repr(align(64))]
 struct Polynomial([f64; COEFFICIENTS]);
 
-/// A term of a covariance.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Term {
-    /// f, in cycles per unit of time.
-    pub(super) frequency: f64,
-    /// p z.
-    pub(super) amplitude: Complex<f64>,
-}
-
 impl Covariance {
-    /// The sum of `terms` for times up to `longest`.
-    pub(super) fn new(terms: &[Term], longest: f64) -> Self {
-        let highest = terms.iter().map(|term| term.frequency).fold(0.0, f64::max);
+    /// One for each of some sets of amplitudes p z at the `frequencies` f, in cycles per unit of time, for
+    /// times up to `longest`.
+    pub(super) fn several(frequencies: &[f64], amplitudes: &[Vec<Complex<f64>>], longest: f64) -> Vec<Self> {
+        let highest = frequencies.iter().copied().fold(0.0, f64::max);
         let density = POINTS_PER_PERIOD * highest;
         // Half of an interpolation lies beyond either end.
         let half = (longest * density).ceil() as usize + ORDER / 2 + 1;
         let first = -(half as f64) / density;
-        let is_even = terms.iter().all(|term| term.amplitude.im == 0.0);
-        let begin = if is_even { half } else { 0 };
-        let mut values = sums(terms, first + begin as f64 / density, 1.0 / density, 2 * half + 1 - begin);
-        values.splice(0..0, std::iter::repeat_n(0.0, begin));
-        for k in 0..begin {
-            values[k] = values[2 * half - k];
-        }
+        let are_even = amplitudes.iter().flatten().all(|amplitude| amplitude.im == 0.0);
+        let begin = if are_even { half } else { 0 };
+        let times =
+            Times { first: first + begin as f64 / density, step: 1.0 / density, count: 2 * half + 1 - begin };
         let economy = Economy::new();
-        let polynomials = values.windows(ORDER).map(|values| economy.polynomial(values)).collect();
-        Self { first: first + (ORDER / 2 - 1) as f64 / density, density, polynomials }
+        let table = |mut values: Vec<f64>| {
+            values.splice(0..0, std::iter::repeat_n(0.0, begin));
+            for k in 0..begin {
+                values[k] = values[2 * half - k];
+            }
+            let polynomials = values.windows(ORDER).map(|values| economy.polynomial(values)).collect();
+            Self { first: first + (ORDER / 2 - 1) as f64 / density, density, polynomials }
+        };
+        times.sums(frequencies, amplitudes).into_iter().map(table).collect()
     }
 
     /// c(t).
@@ -66,13 +62,34 @@ impl Covariance {
     /// # Panics
     /// For times beyond the limit.
     pub(super) fn at(&self, t: f64) -> f64 {
-        let place = (t - self.first) * self.density;
-        // Below 0 it is the largest number.
-        let number = place as i64 as usize;
-        let x = 2.0 * (place - number as f64) - 1.0;
-        let [a, b, c, d, e, f, g, h] = self.polynomials[number].0;
-        let (square, fourth) = (x * x, x * x * x * x);
-        (a + b * x) + (c + d * x) * square + ((e + f * x) + (g + h * x) * square) * fourth
+        let mut value = [t];
+        self.of_times(&mut value);
+        value[0]
+    }
+
+    /// c of each of some times, in their place. Those in a row that lie between the same two points have one
+    /// polynomial, and are computed together.
+    ///
+    /// # Panics
+    /// As [`Covariance::at`].
+    pub(super) fn of_times(&self, times: &mut [f64]) {
+        times.iter_mut().for_each(|t| *t = (*t - self.first) * self.density);
+        let mut rest = times;
+        while let Some(first) = rest.first() {
+            // Below 0 it is the largest number.
+            let number = *first as i64 as usize;
+            let begin = number as f64;
+            let is_here = |place: &&f64| (0.0..1.0).contains(&(**place - begin));
+            let count = rest.iter().take_while(is_here).count().max(1);
+            let (places, others) = rest.split_at_mut(count);
+            let Polynomial([a, b, c, d, e, f, g, h]) = self.polynomials[number];
+            for place in places {
+                let x = 2.0 * (*place - begin) - 1.0;
+                let (square, fourth) = (x * x, x * x * x * x);
+                *place = (a + b * x) + (c + d * x) * square + ((e + f * x) + (g + h * x) * square) * fourth;
+            }
+            rest = others;
+        }
     }
 }
 
@@ -111,29 +128,44 @@ impl Economy {
     }
 }
 
-/// The sums of terms at `count` times. A time is one of few and a step of few more, and a term the product
-/// of two phasors, so the sums are products of matrices.
-fn sums(terms: &[Term], first: f64, step: f64, count: usize) -> Vec<f64> {
-    let begins: Vec<f64> = (0..count).step_by(RENEWAL).map(|n| first + n as f64 * step).collect();
-    let mut values = Mat::zeros(RENEWAL, begins.len());
-    for terms in terms.chunks(TERMS) {
-        let mut turns = Mat::zeros(RENEWAL, 2 * terms.len());
-        for (q, Term { frequency, .. }) in terms.iter().enumerate() {
-            let turn = Complex::from_polar(1.0, TAU * frequency * step);
-            let mut turned = Complex::from(1.0);
-            for n in 0..RENEWAL {
-                (turns[(n, 2 * q)], turns[(n, 2 * q + 1)]) = (turned.re, -turned.im);
-                turned *= turn;
+/// Times at equal distances.
+struct Times {
+    first: f64,
+    step: f64,
+    count: usize,
+}
+
+impl Times {
+    /// The sums of terms at these times, for each set of amplitudes. A time is one of few and a step of few
+    /// more, and a term the product of two phasors, so the sums are products of matrices.
+    fn sums(&self, frequencies: &[f64], amplitudes: &[Vec<Complex<f64>>]) -> Vec<Vec<f64>> {
+        let begins: Vec<f64> =
+            (0..self.count).step_by(RENEWAL).map(|n| self.first + n as f64 * self.step).collect();
+        let mut sums = vec![Mat::zeros(RENEWAL, begins.len()); amplitudes.len()];
+        for start in (0..frequencies.len()).step_by(TERMS) {
+            let frequencies = &frequencies[start..frequencies.len().min(start + TERMS)];
+            let mut turns = Mat::zeros(RENEWAL, 2 * frequencies.len());
+            for (q, frequency) in frequencies.iter().enumerate() {
+                let turn = Complex::from_polar(1.0, TAU * frequency * self.step);
+                let mut turned = Complex::from(1.0);
+                for n in 0..RENEWAL {
+                    (turns[(n, 2 * q)], turns[(n, 2 * q + 1)]) = (turned.re, -turned.im);
+                    turned *= turn;
+                }
+            }
+            let phasors = CMat::from_fn(frequencies.len(), begins.len(), |q, begin| {
+                Complex::from_polar(1.0, TAU * frequencies[q] * begins[begin])
+            });
+            for (sums, amplitudes) in sums.iter_mut().zip(amplitudes) {
+                let phasor = |row: usize, begin: usize| {
+                    let phasor = amplitudes[start + row / 2] * phasors[(row / 2, begin)];
+                    if row.is_multiple_of(2) { phasor.re } else { phasor.im }
+                };
+                sums.gemm(1.0, &turns, &Mat::from_fn(2 * frequencies.len(), begins.len(), phasor), 1.0);
             }
         }
-        let phasor = |row: usize, begin: usize| {
-            let Term { frequency, amplitude } = terms[row / 2];
-            let phasor = amplitude * Complex::from_polar(1.0, TAU * frequency * begins[begin]);
-            if row.is_multiple_of(2) { phasor.re } else { phasor.im }
-        };
-        values.gemm(1.0, &turns, &Mat::from_fn(2 * terms.len(), begins.len(), phasor), 1.0);
+        sums.iter().map(|sums| sums.as_slice()[..self.count].to_vec()).collect()
     }
-    values.as_slice()[..count].to_vec()
 }
 
 /// The weights of the values at -5, -4, .., 6 for the polynomial through them at x in [0, 1).
@@ -182,20 +214,16 @@ mod tests {
     }
 
     fn check_table(phase: f64) {
-        let terms: Vec<Term> = (0..50)
-            .map(|q| Term {
-                frequency: 0.37 * (f64::from(q) + 0.5) / 50.0,
-                amplitude: Complex::from_polar(0.02, phase * f64::from(q)),
-            })
-            .collect();
-        let table = Covariance::new(&terms, 108.0);
+        let frequencies: Vec<f64> = (0..50).map(|q| 0.37 * (f64::from(q) + 0.5) / 50.0).collect();
+        let amplitudes: Vec<Complex<f64>> =
+            (0..50).map(|q| Complex::from_polar(0.02, phase * f64::from(q))).collect();
+        let table =
+            &Covariance::several(&frequencies, &[vec![Complex::ONE; 50], amplitudes.clone()], 108.0)[1];
         let mut worst = 0.0_f64;
         for k in 0..=4000 {
             let t = -108.0 + 0.054 * f64::from(k);
-            let sum: f64 = terms
-                .iter()
-                .map(|term| (term.amplitude * Complex::from_polar(1.0, TAU * term.frequency * t)).re)
-                .sum();
+            let terms = frequencies.iter().zip(&amplitudes);
+            let sum: f64 = terms.map(|(f, z)| (z * Complex::from_polar(1.0, TAU * f * t)).re).sum();
             worst = worst.max((table.at(t) - sum).abs());
         }
         assert!(worst < 4e-14, "{worst:e}");

@@ -88,19 +88,22 @@ impl Estimator {
         SampleSet { signals: &self.signals, samples, among }
     }
 
-    /// The covariances of some samples among one another without noise, the lower triangle.
+    /// The covariances of some samples among one another without noise, the lower triangle. It is filled
+    /// diagonal by diagonal, because times hardly change along these where clocks are even.
     pub(super) fn signal_covariances(&self, samples: &[TimedSample]) -> Mat {
-        let mut among = Mat::zeros(samples.len(), samples.len());
-        let is_one = |one: &TimedSample, other: &TimedSample| one.converter == other.converter;
-        for (l, second) in samples.iter().enumerate() {
-            let mut column = &mut among.as_mut_slice()[l * samples.len() + l..];
-            for run in samples[l..].chunk_by(is_one) {
-                let covariances = self.signals.of_samples(run[0].converter, second.converter);
-                let (entries, rest) = column.split_at_mut(run.len());
-                for (entry, first) in entries.iter_mut().zip(run) {
-                    *entry = covariances.at((first.instant - second.instant).0);
-                }
-                column = rest;
+        let count = samples.len();
+        let mut among = Mat::zeros(count, count);
+        for below in 0..count {
+            let pairs: Vec<_> = samples[below..].iter().zip(samples).collect();
+            let mut diagonal = among.as_mut_slice()[below..].iter_mut().step_by(count + 1);
+            let converters =
+                |(first, second): &(&TimedSample, &TimedSample)| (first.converter, second.converter);
+            for run in pairs.chunk_by(|one, next| converters(one) == converters(next)) {
+                let mut times: Vec<f64> =
+                    run.iter().map(|(first, second)| (first.instant - second.instant).0).collect();
+                let (first, second) = converters(&run[0]);
+                self.signals.of_samples(first, second).of_times(&mut times);
+                times.iter().zip(&mut diagonal).for_each(|(covariance, entry)| *entry = *covariance);
             }
         }
         among

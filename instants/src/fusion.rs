@@ -70,7 +70,7 @@ impl OutputGrid {
         (0..self.ratio).map(|p| FastPeriods(p as f64)).collect()
     }
 
-    fn instants(self, frames: Range<usize>) -> Vec<FastPeriods> {
+    pub(super) fn instants(self, frames: Range<usize>) -> Vec<FastPeriods> {
         (frames.start * self.ratio..frames.end * self.ratio)
             .map(|n| self.first + FastPeriods(n as f64))
             .collect()
@@ -174,25 +174,18 @@ impl KnownInstantFusion<'_> {
         stretch: Option<&Stretch>,
         frames: Range<usize>,
     ) -> Result<Outputs, LinalgError> {
-        let grid = self.layout.grid;
-        let parts = match stretch {
-            Some(stretch) => frames
-                .map(|frame| match stretch.frame(self.recordings, frame) {
-                    Some(found) => Ok(found),
-                    None => self.of_set(&grid.instants(frame..frame + 1)),
-                })
-                .collect::<Result<Vec<_>, _>>()?,
-            None => grid
-                .instants(frames)
-                .chunks(OUTPUTS_OF_SET)
-                .map(|part| self.of_set(part))
-                .collect::<Result<_, _>>()?,
-        };
+        if let Some(stretch) = stretch {
+            return stretch.outputs(self, frames);
+        }
+        let instants = self.layout.grid.instants(frames);
+        let parts =
+            instants.chunks(OUTPUTS_OF_SET).map(|part| self.of_set(part)).collect::<Result<Vec<_>, _>>()?;
         let error = MeanSquare::mean(&parts.iter().map(|part| part.error).collect::<Vec<_>>());
         Ok(Outputs { outputs: parts.into_iter().flat_map(|part| part.outputs).collect(), error })
     }
 
-    fn of_set(&self, instants: &[FastPeriods]) -> Result<Outputs, LinalgError> {
+    /// The outputs at some instants from one set of samples.
+    pub(super) fn of_set(&self, instants: &[FastPeriods]) -> Result<Outputs, LinalgError> {
         demand::outputs(self.estimator, self.recordings, self.layout.reach, instants)
     }
 }

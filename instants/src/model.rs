@@ -13,9 +13,10 @@ use hybank_linalg::{Complex, LinalgError};
 use std::ops::Range;
 
 /// Parts of the run from which the spectrum is learned, and outputs of each.
-const PARTS: usize = 64;
+const PARTS: usize = 48;
 const OUTPUTS_OF_PART: usize = 2048;
-/// Instants at which samples are left out, to judge a model.
+/// Instants at which samples are left out, to judge a band and a model.
+const BAND_TRIALS: usize = 32;
 pub(super) const TRIALS: usize = 64;
 /// The same for the last measurement of the noise: with fewer, a difference of 6 dB between the noises of
 /// recordings may not be significant.
@@ -23,8 +24,10 @@ const NOISE_TRIALS: usize = 256;
 /// Noises that are tried with each band, over the power of the signal: as of recorders with 30, 50 and 70
 /// dB.
 const FIRST_NOISES: [f64; 3] = [1e-3, 1e-5, 1e-7];
-/// Bands that are tried: parts of half of the output's rate.
-const BANDS: std::ops::RangeInclusive<u32> = 3..=16;
+/// Bands that are tried: so many parts of half of the output's rate, and then one more or less than the best
+/// one.
+const BANDS: [u32; 5] = [4, 7, 10, 13, PARTS_OF_BAND];
+const PARTS_OF_BAND: u32 = 16;
 /// The density beyond the band over that within, before the spectrum is learned: so little that noise is not
 /// taken for signal.
 const BEYOND: f64 = 1e-10;
@@ -45,6 +48,12 @@ pub struct Model {
     pub noise: Vec<f64>,
     /// For samples of these recordings; its signal has the power 1.
     pub estimator: Estimator,
+}
+
+/// A model, and how badly samples that are left out are predicted by it.
+struct Judged {
+    misfit: f64,
+    model: Model,
 }
 
 /// What is known of recordings before they are looked at.
@@ -87,12 +96,11 @@ impl Model {
             all.map(|(gain, least)| least.max(share * power * gain * gain)).collect()
         };
         let mut model = Self::best(recordings, prior, settings, power, &noise)?;
-        let trials = |pass: usize| if pass == prior.passes { NOISE_TRIALS } else { TRIALS };
-        model.measure_noise(recordings, prior, settings, trials(0))?;
+        model.measure_noise(recordings, prior, settings, 0)?;
         for pass in 1..=prior.passes {
             let Some((spectrum, power)) = model.relearned(recordings, settings, longest)? else { break };
             model = Self::new(spectrum, power, model.noise, prior);
-            model.measure_noise(recordings, prior, settings, trials(pass))?;
+            model.measure_noise(recordings, prior, settings, pass)?;
         }
         Ok(model)
     }
@@ -107,29 +115,38 @@ impl Model {
         noise: &dyn Fn(f64) -> Vec<f64>,
     ) -> Result<Self, LinalgError> {
         let longest = settings.longest(recordings);
-        let model = |spectrum: Spectrum| Self::new(spectrum, power, noise(FIRST_NOISES[0]), prior);
         let (low, high) = (CyclesPerFastPeriod(0.0), CyclesPerFastPeriod(0.5));
-        let spectra: Vec<Spectrum> = match prior.band {
-            Some(band) => vec![Spectrum::flat(low..band, longest)],
-            None => BANDS
-                .map(|part| CyclesPerFastPeriod(0.5 * f64::from(part) / f64::from(*BANDS.end())))
-                .map(|band| Spectrum::of_pieces([(low..band, 1.0), (band..high, BEYOND)], longest))
-                .collect(),
-        };
-        let mut best = model(spectra[0].clone());
-        let mut least = f64::INFINITY;
-        for spectrum in spectra {
-            let candidate = model(spectrum);
-            let trials = candidate.trials(recordings, settings, TRIALS);
-            for share in FIRST_NOISES {
-                let noise = noise(share);
+        let judged = |spectrum: Spectrum| -> Result<Judged, LinalgError> {
+            let candidate = Self::new(spectrum, power, noise(FIRST_NOISES[0]), prior);
+            let trials = candidate.trials(recordings, settings, BAND_TRIALS);
+            let mut best = Judged { misfit: f64::INFINITY, model: candidate.clone() };
+            for noise in FIRST_NOISES.map(noise) {
                 let misfit = candidate.misfit(&trials, &noise)?;
-                if misfit < least {
-                    (best, least) = (candidate.with_noise(noise), misfit);
+                if misfit < best.misfit {
+                    best = Judged { misfit, model: candidate.with_noise(noise) };
                 }
             }
+            Ok(best)
+        };
+        if let Some(band) = prior.band {
+            return Ok(judged(Spectrum::flat(low..band, longest))?.model);
         }
-        Ok(best)
+        let of_parts = |parts: u32| {
+            let band = CyclesPerFastPeriod(0.5 * f64::from(parts) / f64::from(PARTS_OF_BAND));
+            judged(Spectrum::of_pieces([(low..band, 1.0), (band..high, BEYOND)], longest))
+        };
+        let (mut middle, mut best) = (BANDS[0], of_parts(BANDS[0])?);
+        let mut take_if_better = |parts: u32, middle: &mut u32| -> Result<(), LinalgError> {
+            let candidate = of_parts(parts)?;
+            if candidate.misfit < best.misfit {
+                (*middle, best) = (parts, candidate);
+            }
+            Ok(())
+        };
+        BANDS[1..].iter().try_for_each(|parts| take_if_better(*parts, &mut middle))?;
+        let beside = [middle - 1, (middle + 1).min(PARTS_OF_BAND)];
+        beside.into_iter().try_for_each(|parts| take_if_better(parts, &mut middle))?;
+        Ok(best.model)
     }
 
     fn trials(&self, recordings: &[Recording], settings: FusionSettings, count: usize) -> Trials {
@@ -222,22 +239,26 @@ impl Model {
         recordings: &[Recording],
         prior: &Prior,
         settings: FusionSettings,
-        trials: usize,
+        pass: usize,
     ) -> Result<(), LinalgError> {
-        let trials = self.trials(recordings, settings, trials);
+        let count = if pass == prior.passes { NOISE_TRIALS } else { TRIALS };
+        let trials = self.trials(recordings, settings, count);
         let full: Vec<f64> = prior.gains.iter().map(|gain| self.power * gain * gain).collect();
         let bounded = |levels: &[f64]| -> Vec<f64> {
             let all = levels.iter().zip(&full).zip(&prior.least_noise);
             all.map(|((level, full), least)| (level * full).max(*least)).collect()
         };
         let misfit = |levels: &[f64]| self.misfit(&trials, &bounded(levels));
-        let all: Vec<usize> = (0..recordings.len()).collect();
-        let mut search = NoiseSearch::new(all.len());
-        search.decades(&misfit)?;
-        search.walk(&all, &misfit, 0.0)?;
-        for i in all {
-            search.walk(&[i], &misfit, SIGNIFICANT)?;
+        let levels = self.noise.iter().zip(&full).map(|(noise, full)| noise / full).collect();
+        let mut search = NoiseSearch::new(levels, &misfit)?;
+        search.together(pass > 0)?;
+        // Recorders of one kind have one noise, whatever their distances are.
+        let noises = search.levels().iter().zip(&full).map(|(level, full)| (level * full).ln());
+        let one = (noises.sum::<f64>() / full.len() as f64).exp();
+        if search.take_if_better(full.iter().map(|full| one / full).collect(), 0.0)? {
+            search.together(true)?;
         }
+        (0..recordings.len()).try_for_each(|i| search.alone(i, SIGNIFICANT))?;
         *self = self.with_noise(bounded(search.levels()));
         Ok(())
     }

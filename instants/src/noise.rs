@@ -2,23 +2,31 @@
 
 use hybank_linalg::LinalgError;
 
-/// How far the noise may lie below the signal: recorders have no more.
-const DECADES: i32 = 12;
-/// By what the variance of the noise changes from trial to trial after that: 3 and 1 dB.
-const FACTORS: [f64; 2] = [1.995_262_314_968_879_6, 1.258_925_411_794_167_2];
+/// By what the variance of the noise changes from trial to trial: 10 dB where nothing is known, because far
+/// below the right value the likelihood is flat, then 3 and 1 dB.
+const COARSE: f64 = 10.0;
+const MIDDLE: f64 = 1.995_262_314_968_879_6;
+const FINE: f64 = 1.258_925_411_794_167_2;
+
+/// Share of the gain of a first step that a further one must have: where the likelihood is flat, it has
+/// none.
+const FURTHER: f64 = 0.1;
 
 /// Noises, over the power of the signal in each recording, and how badly they predict.
-pub(super) struct NoiseSearch {
+pub(super) struct NoiseSearch<'a> {
     levels: Vec<f64>,
-    misfit: f64,
+    least: f64,
+    misfit: Misfit<'a>,
 }
 
 /// How badly samples that are left out are predicted with these levels.
 pub(super) type Misfit<'a> = &'a dyn Fn(&[f64]) -> Result<f64, LinalgError>;
 
-impl NoiseSearch {
-    pub(super) fn new(recordings: usize) -> Self {
-        Self { levels: vec![1.0; recordings], misfit: f64::INFINITY }
+impl<'a> NoiseSearch<'a> {
+    /// From these levels on.
+    pub(super) fn new(levels: Vec<f64>, misfit: Misfit<'a>) -> Result<Self, LinalgError> {
+        let least = misfit(&levels)?;
+        Ok(Self { levels, least, misfit })
     }
 
     /// The levels found.
@@ -26,42 +34,48 @@ impl NoiseSearch {
         &self.levels
     }
 
-    /// The best decade for all: far below the right value the likelihood is flat, and a walk would stay
-    /// there.
-    pub(super) fn decades(&mut self, misfit: Misfit<'_>) -> Result<(), LinalgError> {
-        let count = self.levels.len();
-        for decade in 0..=DECADES {
-            self.take_if_better(vec![10.0_f64.powi(-decade); count], misfit, 0.0)?;
+    /// Changes all levels together, which may be wrong by decades or are nearly right.
+    pub(super) fn together(&mut self, are_near: bool) -> Result<(), LinalgError> {
+        let all: Vec<usize> = (0..self.levels.len()).collect();
+        let factors = [COARSE, MIDDLE, FINE].into_iter().skip(usize::from(are_near));
+        factors.map(|factor| self.walk(&all, factor, 0.0)).try_for_each(|found| found.map(|_| ()))
+    }
+
+    /// Changes one level, if the first step is better by `gain`.
+    pub(super) fn alone(&mut self, one: usize, gain: f64) -> Result<(), LinalgError> {
+        if self.walk(&[one], MIDDLE, gain)? {
+            self.walk(&[one], FINE, FURTHER * gain)?;
         }
         Ok(())
     }
 
-    /// Walks with the levels of `some` together; the first step must be better by `gain`.
-    pub(super) fn walk(&mut self, some: &[usize], misfit: Misfit<'_>, gain: f64) -> Result<(), LinalgError> {
-        for step in FACTORS.into_iter().flat_map(|factor| [factor, 1.0 / factor]) {
-            let mut gain = gain;
-            loop {
-                let mut levels = self.levels.clone();
-                some.iter().for_each(|&i| levels[i] *= step);
-                if !self.take_if_better(levels, misfit, gain)? {
-                    break;
-                }
-                gain = 0.0;
+    /// Walks up with the levels of `some`, or else down, as long as that is better; the first step must be
+    /// better by `gain`, the others by a share of it. Whether there was one.
+    fn walk(&mut self, some: &[usize], factor: f64, gain: f64) -> Result<bool, LinalgError> {
+        for step in [factor, 1.0 / factor] {
+            let mut found = false;
+            while self.take_if_better(self.stepped(some, step), if found { FURTHER * gain } else { gain })? {
+                found = true;
+            }
+            if found {
+                return Ok(true);
             }
         }
-        Ok(())
+        Ok(false)
     }
 
-    fn take_if_better(
-        &mut self,
-        levels: Vec<f64>,
-        misfit: Misfit<'_>,
-        gain: f64,
-    ) -> Result<bool, LinalgError> {
-        let found = misfit(&levels)?;
-        let is_better = found + gain < self.misfit;
+    fn stepped(&self, some: &[usize], step: f64) -> Vec<f64> {
+        let mut levels = self.levels.clone();
+        some.iter().for_each(|&i| levels[i] *= step);
+        levels
+    }
+
+    /// Takes these levels if they are better by `gain`, and says whether they are.
+    pub(super) fn take_if_better(&mut self, levels: Vec<f64>, gain: f64) -> Result<bool, LinalgError> {
+        let found = (self.misfit)(&levels)?;
+        let is_better = found + gain < self.least;
         if is_better {
-            (self.levels, self.misfit) = (levels, found);
+            (self.levels, self.least) = (levels, found);
         }
         Ok(is_better)
     }

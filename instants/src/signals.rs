@@ -1,7 +1,7 @@
 //! What converters make of a signal.
 
-use super::covariance::{Covariance, Term};
-use super::spectrum::Spectrum;
+use super::covariance::Covariance;
+use super::spectrum::{Node, Spectrum};
 use hybank_core::units::{CyclesPerFastPeriod, FastPeriods};
 use hybank_linalg::Complex;
 use std::f64::consts::TAU;
@@ -76,15 +76,18 @@ impl Signals {
             deviation: converter.delay_deviation.0,
         };
         let behaviours = converters.iter().map(|converter| number_of(&mut kinds, of(converter))).collect();
-        let mut nodes = Nodes::new(spectrum, front_ends);
+        let mut tables = Tables(Vec::new());
         let exact = |front_end: usize| Behaviour { front_end, deviation: 0.0 };
-        let own: Vec<Arc<Covariance>> =
-            kinds.iter().map(|kind| nodes.covariance(exact(kind.front_end), exact(kind.front_end))).collect();
-        let pairs =
-            kinds.iter().enumerate().flat_map(|(a, one)| kinds[..=a].iter().map(move |two| (one, two)));
-        let cross = pairs.map(|(one, two)| nodes.covariance(*one, *two)).collect();
-        let with_target = kinds.iter().map(|kind| nodes.covariance(*kind, exact(target))).collect();
-        let target_power = nodes.covariance(exact(target), exact(target)).at(0.0);
+        let (mut own, mut cross, mut with_target) = (Vec::new(), Vec::new(), Vec::new());
+        for (a, &kind) in kinds.iter().enumerate() {
+            own.push(tables.number(exact(kind.front_end), exact(kind.front_end)));
+            cross.extend(kinds[..=a].iter().map(|&other| tables.number(kind, other)));
+            with_target.push(tables.number(kind, exact(target)));
+        }
+        let (covariances, target_power) = tables.made(spectrum, front_ends, target);
+        let [own, cross, with_target] = [own, cross, with_target].map(|numbers| {
+            numbers.into_iter().map(|number: usize| Arc::clone(&covariances[number])).collect()
+        });
         let mut signals = Self {
             converters,
             behaviours,
@@ -174,46 +177,57 @@ impl Scaled<'_> {
     pub(super) fn at(self, later: f64) -> f64 {
         self.factor * self.covariance.at(self.sign * later)
     }
+
+    /// The same for each of some times, in their place.
+    pub(super) fn of_times(self, times: &mut [f64]) {
+        times.iter_mut().for_each(|later| *later *= self.sign);
+        self.covariance.of_times(times);
+        times.iter_mut().for_each(|covariance| *covariance *= self.factor);
+    }
 }
 
-fn number_of(kinds: &mut Vec<Behaviour>, kind: Behaviour) -> usize {
+fn number_of<K: PartialEq>(kinds: &mut Vec<K>, kind: K) -> usize {
     kinds.iter().position(|known| *known == kind).unwrap_or_else(|| {
         kinds.push(kind);
         kinds.len() - 1
     })
 }
 
-/// The spectrum with the responses of all front ends at its nodes.
-struct Nodes<'a> {
-    spectrum: &'a Spectrum,
-    responses: Vec<Vec<Complex<f64>>>,
-    /// What was computed, by the numbers of the front ends and the variance of the time between them.
-    known: Vec<((usize, usize, f64), Arc<Covariance>)>,
-}
+/// The covariances that are needed: of the outputs of two front ends, the first at the later instant, with
+/// this variance of the time between them.
+struct Tables(Vec<(usize, usize, f64)>);
 
-impl<'a> Nodes<'a> {
-    fn new(spectrum: &'a Spectrum, front_ends: &[&dyn Fn(CyclesPerFastPeriod) -> Complex<f64>]) -> Self {
-        let response = |front_end: &&dyn Fn(CyclesPerFastPeriod) -> Complex<f64>| {
-            spectrum.nodes().iter().map(|node| front_end(node.frequency)).collect()
-        };
-        Self { spectrum, responses: front_ends.iter().map(response).collect(), known: Vec::new() }
+impl Tables {
+    /// The number of a covariance.
+    fn number(&mut self, one: Behaviour, two: Behaviour) -> usize {
+        let variance = one.deviation.powi(2) + two.deviation.powi(2);
+        number_of(&mut self.0, (one.front_end, two.front_end, variance))
     }
 
-    /// Of the outputs of two front ends, the first at the later instant.
-    fn covariance(&mut self, one: Behaviour, two: Behaviour) -> Arc<Covariance> {
-        let variance = one.deviation.powi(2) + two.deviation.powi(2);
-        let key = (one.front_end, two.front_end, variance);
-        if let Some((_, known)) = self.known.iter().find(|(known, _)| *known == key) {
-            return Arc::clone(known);
-        }
-        let term = |(q, node): (usize, &super::Node)| {
-            let characteristic = (-0.5 * (TAU * node.frequency.0).powi(2) * variance).exp();
-            let product = self.responses[one.front_end][q] * self.responses[two.front_end][q].conj();
-            Term { frequency: node.frequency.0, amplitude: product * (node.power * characteristic) }
+    /// All of them, and the power of the target.
+    fn made(
+        &self,
+        spectrum: &Spectrum,
+        front_ends: &[&dyn Fn(CyclesPerFastPeriod) -> Complex<f64>],
+        target: usize,
+    ) -> (Vec<Arc<Covariance>>, f64) {
+        let nodes = spectrum.nodes();
+        let response = |front_end: &&dyn Fn(CyclesPerFastPeriod) -> Complex<f64>| {
+            nodes.iter().map(|node| front_end(node.frequency)).collect()
         };
-        let terms: Vec<Term> = self.spectrum.nodes().iter().enumerate().map(term).collect();
-        let new = Arc::new(Covariance::new(&terms, self.spectrum.longest().0));
-        self.known.push((key, Arc::clone(&new)));
-        new
+        let responses: Vec<Vec<Complex<f64>>> = front_ends.iter().map(response).collect();
+        let amplitudes = |&(one, two, variance): &(usize, usize, f64)| {
+            let amplitude = |(node, (one, two)): (&Node, (&Complex<f64>, &Complex<f64>))| {
+                let characteristic = (-0.5 * (TAU * node.frequency.0).powi(2) * variance).exp();
+                one * two.conj() * (node.power * characteristic)
+            };
+            nodes.iter().zip(responses[one].iter().zip(&responses[two])).map(amplitude).collect()
+        };
+        let all: Vec<Vec<Complex<f64>>> = self.0.iter().map(amplitudes).collect();
+        let frequencies: Vec<f64> = nodes.iter().map(|node| node.frequency.0).collect();
+        let covariances = Covariance::several(&frequencies, &all, spectrum.longest().0);
+        let power =
+            nodes.iter().zip(&responses[target]).map(|(node, response)| node.power * response.norm_sqr());
+        (covariances.into_iter().map(Arc::new).collect(), power.sum())
     }
 }

@@ -301,6 +301,34 @@ fn unequal_rates_are_fused_as_predicted() {
     assert!(decibels(found) > 30.0, "{}", decibels(found));
 }
 
+/// Of even clocks and of stamps, in any order of the converters: each entry by itself.
+#[test]
+fn the_covariances_of_a_set_are_those_of_pairs() {
+    let mut random = Random(19);
+    let of = |converter: usize, count: u32, period: f64, jitter: f64, random: &mut Random| {
+        (0..count)
+            .map(|n| FastPeriods(period * f64::from(n) + jitter * random.sample()))
+            .map(|instant| TimedSample { converter, instant })
+            .collect::<Vec<_>>()
+    };
+    let parts = [(1, 5, 2.0, 0.0), (0, 24, 2.00004, 0.0), (2, 9, 2.1, 0.4), (1, 7, 2.0, 0.0)];
+    let samples = parts.map(|(i, count, period, jitter)| of(i, count, period, jitter, &mut random)).concat();
+    let estimator = of_band(
+        vec![Converter::exact(0, 1.0, 1e-8), Converter::exact(0, -0.5, 1e-8), Converter::exact(0, 2.0, 1e-8)],
+        60.0,
+    );
+    let covariances = estimator.signal_covariances(&samples);
+    for (k, first) in samples.iter().enumerate() {
+        for (l, second) in samples[..=k].iter().enumerate() {
+            let gains = [first, second].map(|one| [1.0, -0.5, 2.0][one.converter]);
+            let x = 2.0 * PI * 0.375 * (first.instant - second.instant).0;
+            let flat = if x == 0.0 { 1.0 } else { x.sin() / x };
+            let wrong = covariances[(k, l)] - gains[0] * gains[1] * flat;
+            assert!(wrong.abs() < 1e-13, "{k} {l}: {wrong:e}");
+        }
+    }
+}
+
 /// The residuals of samples that are left out have the variances of the model.
 #[test]
 fn residuals_have_the_variance_of_the_model() {

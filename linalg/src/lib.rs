@@ -20,7 +20,7 @@ pub use solve::{PositiveFactor, cholesky, inverse, lq, lq_factor, solve, solve_l
 
 use faer::MatRef;
 pub use nalgebra::Complex;
-use nalgebra::{ComplexField, DMatrix};
+use nalgebra::{ComplexField, DMatrix, DMatrixView, Dyn};
 
 /// Real matrix of run-time size.
 pub type Mat = DMatrix<f64>;
@@ -120,6 +120,25 @@ pub fn dot(x: &[f64], y: &[f64]) -> f64 {
     }
     sums.iter_mut().zip(x_rest.iter().zip(y_rest)).for_each(|(sum, (x, y))| *sum += x * y);
     sums.iter().sum()
+}
+
+/// Adds to row n of `sums` the inner products of the columns of `taps` with the `samples` from n on: those
+/// of several filters, one in each column.
+///
+/// ```
+/// use hybank_linalg::{Mat, add_filtered};
+/// let mut sums = Mat::zeros(2, 1);
+/// add_filtered(&mut sums, &[1.0, 2.0, 3.0], &Mat::from_row_slice(2, 1, &[10.0, 1.0]));
+/// assert_eq!(sums.as_slice(), [12.0, 23.0]);
+/// ```
+///
+/// # Panics
+/// If `samples` has fewer than the rows of `sums` and `taps` together, less 1, or both have not as many
+/// columns.
+pub fn add_filtered(sums: &mut Mat, samples: &[f64], taps: &Mat) {
+    let windows =
+        DMatrixView::<f64, Dyn, Dyn>::from_slice_with_strides(samples, sums.nrows(), taps.nrows(), 1, 1);
+    sums.gemm(1.0, &windows, taps, 1.0);
 }
 
 /// `[p_1 p_2 ..]`: the `parts` side by side. No parts give a 0 x 0 matrix.

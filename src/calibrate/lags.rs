@@ -33,6 +33,8 @@ const LEAST_ODDS: f64 = 30.0;
 /// With less the lags of other probes, which samples that are lost explain, are to be less likely: the best
 /// of many lines has high odds by chance.
 const CERTAIN_ODDS: f64 = 120.0;
+/// With more the shorter probes are not asked.
+const BEYOND_DOUBT: f64 = 1000.0;
 /// Other lags with this share of the log-odds of the best ones explain the recordings as well: voices that
 /// say different things correlate far beyond chance, but at many lags.
 const ALIKE_ODDS_SHARE: f64 = 0.5;
@@ -96,6 +98,9 @@ pub(crate) fn stretch(record: &Record, first: i64, length: usize) -> Vec<f64> {
 /// and agrees with it in their middle, where the lag grows by `rate`.
 pub(crate) fn steadied(record: &Record, first: usize, length: usize, rate: f64) -> Record {
     let mut part = record.part(first..first + length);
+    if rate == 0.0 {
+        return part;
+    }
     let around =
         stretch(record, first as i64 - INTERPOLATION_MARGIN as i64, length + 2 * INTERPOLATION_MARGIN);
     let begin = INTERPOLATION_MARGIN as f64 - 0.5 * rate * (length as f64 - 1.0);
@@ -137,7 +142,7 @@ impl Correlation {
     /// With the stretch of this spectrum.
     pub(crate) fn of(&self, spectrum: &[Complex<f64>]) -> Vec<f64> {
         let cross = fourier::half_whitened(spectrum, &self.spectrum);
-        let most = 2.0 * cross.iter().map(|bin| bin.norm()).sum::<f64>();
+        let most = 2.0 * cross.iter().map(|bin| bin.norm_sqr().sqrt()).sum::<f64>();
         let mut sums = fourier::real_sequence(&cross, self.size);
         sums.iter_mut().for_each(|x| *x = if most > 0.0 { *x / most } else { 0.0 });
         sums
@@ -198,7 +203,7 @@ fn lags(probes: &[Probe], record: &Record, within: f64) -> Vec<Lag> {
 impl Peaks {
     /// Takes the first `count` correlations of a block, whose first one has the lag `offset`.
     fn take(&mut self, heights: &[f64], offset: i64, count: usize, within: f64) {
-        let at = |l: usize| heights[l % heights.len()].abs();
+        let at = |l: usize| heights[l].abs();
         for l in 0..count {
             let (lag, height) = (offset + l as i64, at(l));
             if (lag as f64).abs() > within {
@@ -206,13 +211,18 @@ impl Peaks {
             }
             self.squares += height * height;
             self.count += usize::from(height > 0.0);
-            if height >= at(l + heights.len() - 1) && height >= at(l + 1) {
+            let beside = [l.checked_sub(1).unwrap_or(heights.len() - 1), l + 1];
+            if beside.into_iter().all(|l| height >= at(l)) {
                 self.offer(CorrelationPeak { lag, height });
             }
         }
     }
 
     fn offer(&mut self, peak: CorrelationPeak) {
+        // Nearly all are lower than those that are kept.
+        if self.largest.get(PEAKS - 1).is_some_and(|least| least.height >= peak.height) {
+            return;
+        }
         let is_near = |other: &CorrelationPeak| ((other.lag - peak.lag) as f64).abs() <= NEIGHBOURS;
         if self.largest.iter().any(|other| is_near(other) && other.height >= peak.height) {
             return;
@@ -297,16 +307,20 @@ impl LagLine {
 /// # Errors
 /// The lags, in samples, that explain the recordings alike; none if no lag stands out.
 pub(crate) fn line(reference: &Record, other: &Record, within: f64) -> Result<LagLine, Vec<i64>> {
-    let found = LONGEST_PROBES.map(|longest| {
+    let found = |longest: usize| -> Vec<Lag> {
         if reference.samples.len() <= other.samples.len() {
             return lags(&probes(reference, longest), other, within);
         }
         let lags = lags(&probes(other, longest), reference, within);
         lags.into_iter().map(Lag::reversed).collect()
-    });
+    };
     let best = |lags: &[Lag]| lines(lags).first().map_or(0.0, |(odds, _)| *odds);
-    let [long, short] = &found;
-    let [first, second] = if best(long) >= best(short) { [long, short] } else { [short, long] };
+    let long = found(LONGEST_PROBES[0]);
+    if let (Ok(line), true) = (likeliest(&long), best(&long) >= BEYOND_DOUBT) {
+        return Ok(line);
+    }
+    let short = found(LONGEST_PROBES[1]);
+    let [first, second] = if best(&long) >= best(&short) { [&long, &short] } else { [&short, &long] };
     // Claps are alike to short probes, and apart to longer ones.
     likeliest(first).or_else(|alike| likeliest(second).map_err(|_| alike))
 }

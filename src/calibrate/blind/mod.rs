@@ -46,8 +46,10 @@ use std::ops::RangeInclusive;
 
 /// Least number of frames in a row.
 const LEAST_FRAMES: usize = 256;
-/// The iteration ends when every step is below this share of its standard deviation.
-const SMALL_STEP: f64 = 1e-3;
+/// The iteration ends when every step is below this share of its standard deviation: the first one only
+/// shows which aliases there are.
+const FIRST_SMALL_STEP: f64 = 0.3;
+const FINAL_SMALL_STEP: f64 = 1e-3;
 /// Largest step of a delay in fast periods: a quarter of the period of the highest frequency below pi.
 const LARGEST_STEP: f64 = 0.5;
 /// Eigenvalues below this share of the largest count as noise: at first, when wrong delays smear the phases
@@ -97,6 +99,8 @@ pub(super) struct Maximum<'a> {
     freedom: usize,
     /// Mean noise of the used bands, per sample.
     noise: f64,
+    /// Share of its standard deviation below which a step is small.
+    small_step: f64,
 }
 
 impl LeastSquares for Maximum<'_> {
@@ -139,7 +143,7 @@ impl LeastSquares for Maximum<'_> {
     fn limits(&self, k: usize, sigma: f64) -> StepLimits {
         let is_delay = self.point.parameters[k].kind == ChannelParameter::Delay;
         let largest = if is_delay { LARGEST_STEP } else { f64::INFINITY };
-        StepLimits { largest, negligible: SMALL_STEP * sigma }
+        StepLimits { largest, negligible: self.small_step * sigma }
     }
 
     fn error(&self, why: NoMinimum) -> CalibrateError {
@@ -179,8 +183,10 @@ impl<'a> Blind<'a> {
     /// intervals call for.
     pub(super) fn fit(&self, settings: CalibrationSettings) -> Result<Fitted, CalibrateError> {
         let CalibrationSettings { fit, reference } = settings;
-        let first = self.ascended(ChannelValues::nominal(self.model, fit, reference), FIRST_LEAST)?.0;
-        let (maximum, minimum) = self.ascended(first.point, FINAL_LEAST)?;
+        let first = self
+            .ascended(ChannelValues::nominal(self.model, fit, reference), FIRST_LEAST, FIRST_SMALL_STEP)?
+            .0;
+        let (maximum, minimum) = self.ascended(first.point, FINAL_LEAST, FINAL_SMALL_STEP)?;
         let factor = self.spectra.iter().map(|spectra| spectra.variance_factor).fold(1.0, f64::max);
         let (squares, freedom) = (maximum.squares / factor, maximum.freedom);
         let offsets = fit.offset.then(|| maximum.offsets(reference));
@@ -211,14 +217,20 @@ impl<'a> Blind<'a> {
         counted.enumerate().filter_map(of).collect()
     }
 
-    fn ascended(&self, point: ChannelValues, least: f64) -> Result<(Maximum<'_>, Minimum), CalibrateError> {
+    fn ascended(
+        &self,
+        point: ChannelValues,
+        least: f64,
+        small_step: f64,
+    ) -> Result<(Maximum<'_>, Minimum), CalibrateError> {
         let occupied = self.bands(&point.delays, least);
-        let mut used = vec![0; self.all_bands(&point.delays).count()];
+        let mut used = vec![0; self.spectra.iter().map(Spectra::band_count).sum()];
         occupied.iter().for_each(|one| used[one.index] = one.aliases.len());
         if occupied.is_empty() {
             return Err(CalibrateError::AllAliasesOccupied { channels: self.model.channels() });
         }
-        let mut maximum = Maximum { blind: self, point, used, squares: 0.0, freedom: 0, noise: 0.0 };
+        let mut maximum =
+            Maximum { blind: self, point, used, squares: 0.0, freedom: 0, noise: 0.0, small_step };
         let minimum = minimise(&mut maximum)?;
         Ok((maximum, minimum))
     }

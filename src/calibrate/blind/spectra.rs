@@ -74,11 +74,17 @@ impl Spectra {
 
     /// The spectral matrices with the phases of `delays` removed.
     pub(in crate::calibrate) fn bands(&self, delays: &[f64]) -> Vec<SpectralBand> {
-        let end = self.frames.div_ceil(2).saturating_sub(FIRST_BIN);
-        let all = end.saturating_sub(FIRST_BIN);
-        let count = (all / BINS_PER_BAND).clamp(1, MOST_BANDS);
+        let (all, count) = (self.bins_of_bands(), self.band_count());
         let edge = |b: usize| FIRST_BIN + all * b / count;
         (0..count).map(|b| self.band(edge(b), edge(b + 1), delays)).collect()
+    }
+
+    pub(super) fn band_count(&self) -> usize {
+        (self.bins_of_bands() / BINS_PER_BAND).clamp(1, MOST_BANDS)
+    }
+
+    fn bins_of_bands(&self) -> usize {
+        self.frames.div_ceil(2).saturating_sub(2 * FIRST_BIN)
     }
 
     /// The bins next to 0 Hz of a channel with the phase of its `delay` removed, each with its W.
@@ -94,10 +100,16 @@ impl Spectra {
         let mut matrix = CMat::zeros(n, n);
         let mut column = vec![Complex::ZERO; n];
         let step = TAU / self.frames as f64;
+        let turned = |w: f64| -> Vec<Complex<f64>> {
+            delays.iter().map(|delay| Complex::from_polar(1.0, w * delay / self.ratio)).collect()
+        };
+        let (mut phasors, turns) = (turned(first as f64 * step), turned(step));
         for b in first..end {
-            let w = b as f64 * step;
-            for ((slot, bins), delay) in column.iter_mut().zip(&self.bins).zip(delays) {
-                *slot = bins[b] * Complex::from_polar(1.0, w * delay / self.ratio);
+            for (((slot, bins), phasor), turn) in
+                column.iter_mut().zip(&self.bins).zip(&mut phasors).zip(&turns)
+            {
+                *slot = bins[b] * *phasor;
+                *phasor *= turn;
             }
             for i in 0..n {
                 for j in 0..n {
