@@ -143,10 +143,16 @@ impl Image {
         (0..4).map(|k| down[k] * of_row(k)).sum()
     }
 
-    /// The image after half a turn.
-    pub(crate) fn turned(&self) -> Self {
-        let data = self.data.chunks_exact(self.channels).rev().flatten().copied().collect();
-        Self { data, ..*self }
+    /// The image after so many quarter turns to the right.
+    pub(crate) fn turned(&self, quarters: usize) -> Self {
+        (0..quarters).fold(self.clone(), |image, _| image.turned_right())
+    }
+
+    fn turned_right(&self) -> Self {
+        let columns = (0..self.width).flat_map(|x| (0..self.height).rev().map(move |y| y * self.width + x));
+        let pixel = |p: usize| &self.data[p * self.channels..(p + 1) * self.channels];
+        let data = columns.flat_map(pixel).copied().collect();
+        Self { width: self.height, height: self.width, channels: self.channels, data }
     }
 
     /// The same image with three channels.

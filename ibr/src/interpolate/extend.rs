@@ -19,6 +19,13 @@ impl<const C: usize> Level<C> {
         }
     }
 
+    /// The same at single pixels.
+    pub(super) fn extension(&self) -> impl Fn(usize) -> [f32; C] {
+        let mut coarse = self.halved();
+        coarse.extend();
+        move |p| self.filled(p, &coarse)
+    }
+
     fn height(&self) -> usize {
         self.weights.len() / self.width.max(1)
     }
@@ -42,15 +49,18 @@ impl<const C: usize> Level<C> {
 
     /// Fills what is missing with the bilinear interpolation of the level of half the size.
     fn blend(&mut self, coarse: &Self) {
-        let width = self.width;
-        for (p, (value, weight)) in self.values.iter_mut().zip(&mut self.weights).enumerate() {
-            let missing = 1.0 - *weight;
-            if missing > 0.0 {
-                let filling = coarse.between(p % width, p / width);
-                value.iter_mut().zip(filling).for_each(|(v, f)| *v = *weight * *v + missing * f);
-                *weight = 1.0;
-            }
+        self.values = (0..self.weights.len()).map(|p| self.filled(p, coarse)).collect();
+        self.weights.fill(1.0);
+    }
+
+    fn filled(&self, p: usize, coarse: &Self) -> [f32; C] {
+        let (value, weight) = (self.values[p], self.weights[p]);
+        let missing = 1.0 - weight;
+        if missing <= 0.0 {
+            return value;
         }
+        let filling = coarse.between(p % self.width, p / self.width);
+        std::array::from_fn(|c| weight * value[c] + missing * filling[c])
     }
 
     /// The value at a pixel of the level of twice the size: a quarter of a pixel beside the nearest one.

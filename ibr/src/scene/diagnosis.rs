@@ -69,14 +69,31 @@ fn suspicions<P: Suspected>(views: &[SourceView<P>]) -> Vec<Suspicion<P>> {
             });
         }
     }
-    let turned = views.iter().map(|view| SourceView { image: view.image.turned(), ..view.clone() });
-    all.push(Suspicion {
-        views: turned.collect(),
-        said: "the photographs seem to be upside down, as where a program ignores how the camera was held (EXIF)"
-            .into(),
-    });
+    all.extend(turned(views));
     all.extend(P::mistakes(views).into_iter().map(|(views, said)| Suspicion { views, said }));
     all
+}
+
+/// Photographs whose pixels lie as the sensor has them. Those with a map of another shape were refused.
+fn turned<P: Viewpoint>(views: &[SourceView<P>]) -> impl Iterator<Item = Suspicion<P>> {
+    let is_square = views.iter().all(|view| view.image.width() == view.image.height());
+    let turns = [
+        (2, "be upside down"),
+        (1, "lie on their side and to need a quarter turn to the right"),
+        (3, "lie on their side and to need a quarter turn to the left"),
+    ];
+    let turned = |quarters: usize| {
+        views
+            .iter()
+            .map(move |view| SourceView { image: view.image.turned(quarters), ..view.clone() })
+            .collect()
+    };
+    turns.into_iter().take(if is_square { 3 } else { 1 }).map(move |(quarters, what)| Suspicion {
+        views: turned(quarters),
+        said: format!(
+            "the photographs seem to {what}, as where a program ignores how the camera was held (EXIF)"
+        ),
+    })
 }
 
 fn scaled<P: Viewpoint>(views: &[SourceView<P>], factor: f64) -> Suspicion<P> {
@@ -181,11 +198,26 @@ mod tests {
         inverse.iter_mut().for_each(|view| view.camera = view.camera.inverted().unwrap());
         assert!(named(&inverse).contains("map to the world"), "{}", named(&inverse));
         let mut turned = views();
-        turned.iter_mut().for_each(|view| view.image = view.image.turned());
+        turned.iter_mut().for_each(|view| view.image = view.image.turned(2));
         assert!(named(&turned).contains("upside down"), "{}", named(&turned));
         let mut zoomed = views();
         zoomed.iter_mut().for_each(|view| view.camera = view.camera.zoomed(2.0).unwrap());
         assert!(named(&zoomed).contains("twice too long"), "{}", named(&zoomed));
+    }
+
+    #[test]
+    fn square_photographs_on_their_side_are_named() {
+        let view = |place: f64| {
+            let camera = Camera::metric(rig_camera(place, (120, 120)), false).unwrap();
+            let (image, map) = SyntheticScene::default().view(&camera, (120, 120));
+            SourceView { image, map, camera }
+        };
+        for (quarters, back) in [(1, "to the left"), (3, "to the right")] {
+            let mut views = [0.0, 0.6].map(view);
+            views.iter_mut().for_each(|view| view.image = view.image.turned(quarters));
+            let said = named(&views);
+            assert!(said.contains("on their side") && said.contains(back), "{quarters}: {said}");
+        }
     }
 
     #[test]

@@ -15,7 +15,7 @@ pub use goals::MOST_FRAMES;
 pub(crate) use maps::photograph;
 
 use super::prepare::{Preparation, PrepareSettings, prepare};
-use super::spec::{KEYS, SceneSpec, ViewSpec};
+use super::spec::{SceneKind, SceneSpec, ViewSpec};
 use super::unknown::Unknown;
 use super::{Kind, Scene};
 use crate::files::InputError;
@@ -179,10 +179,10 @@ impl<'a> Loader<'a> {
     }
 
     /// The keys that a table has; those of another kind of scene are refused instead of ignored.
-    fn keys_of_table(&self, named: &str, kind: &str, table: &impl Serialize) -> Loaded<toml::Table> {
+    fn keys_of_table(&self, named: &str, kind: SceneKind, table: &impl Serialize) -> Loaded<toml::Table> {
         let given = toml::Table::try_from(table).map_err(|e| self.incomplete(e))?;
-        match KEYS.iter().find(|(key, kinds)| given.contains_key(*key) && !kinds.contains(kind)) {
-            Some((key, _)) => Err(self.incomplete(format!(
+        match given.keys().find(|key| !kind.has(key)) {
+            Some(key) => Err(self.incomplete(format!(
                 "{named} has `{key}`, which has no meaning in a {kind} scene; remove it, or give all views the keys of one kind"
             ))),
             None => Ok(given),
@@ -204,7 +204,7 @@ impl<'a> Loader<'a> {
         read_image(&self.file(path), self.options.max_pixels)
     }
 
-    fn need<T>(&self, value: Option<T>, view: &ViewSpec, key: &str, kind: &str) -> Loaded<T> {
+    fn need<T>(&self, value: Option<T>, view: &ViewSpec, key: &str, kind: SceneKind) -> Loaded<T> {
         value.ok_or_else(|| {
             let remedy = match key {
                 "depth" | "disparity" => format!("; {key} = \"matched\" finds it from the photographs"),

@@ -154,32 +154,58 @@ impl SceneSpec {
     }
 }
 
-/// Keys that not all kinds of scenes have, whichever table they are in, with the kinds that have them.
-pub(super) const KEYS: [(&str, &str); 23] = [
-    ("matches", "matches-only"),
-    ("transforms", "calibrated"),
-    ("mirrored", "calibrated"),
-    ("unknown", "rectified, calibrated"),
-    ("disparity", "rectified"),
-    ("disparity_scale", "rectified"),
-    ("disparity_offset", "rectified"),
-    ("position", "rectified"),
-    ("to_position", "rectified"),
-    ("camera", "calibrated"),
-    ("cameras", "calibrated"),
-    ("camera_of", "calibrated"),
-    ("to_camera", "calibrated"),
-    ("to_camera_of", "calibrated"),
-    ("depth", "calibrated"),
-    ("depth_scale", "calibrated"),
-    ("mask", "rectified, calibrated"),
-    ("colmap", "calibrated"),
-    ("step", "rectified, calibrated"),
-    ("column", "matches-only"),
-    ("from_tracks", "matches-only"),
-    ("between", "matches-only"),
-    ("to_between", "matches-only"),
-];
+/// The kinds of scenes, as messages call them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SceneKind {
+    Rectified,
+    Calibrated,
+    MatchesOnly,
+}
+
+impl fmt::Display for SceneKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Rectified => "rectified",
+            Self::Calibrated => "calibrated",
+            Self::MatchesOnly => "matches-only",
+        })
+    }
+}
+
+impl SceneKind {
+    const WITH_DEPTH: [Self; 2] = [Self::Rectified, Self::Calibrated];
+
+    /// Keys that not all kinds of scenes have, whichever table they are in, with the kinds that have them.
+    pub(super) const KEYS: [(&[Self], &[&str]); 4] = [
+        (&Self::WITH_DEPTH, &["unknown", "mask", "step"]),
+        (
+            &[Self::Rectified],
+            &["disparity", "disparity_scale", "disparity_offset", "position", "to_position"],
+        ),
+        (
+            &[Self::Calibrated],
+            &[
+                "transforms",
+                "mirrored",
+                "camera",
+                "cameras",
+                "camera_of",
+                "to_camera",
+                "to_camera_of",
+                "depth",
+                "depth_scale",
+                "colmap",
+            ],
+        ),
+        (&[Self::MatchesOnly], &["matches", "column", "from_tracks", "between", "to_between"]),
+    ];
+
+    /// Whether a scene of this kind may have a key.
+    pub(super) fn has(self, key: &str) -> bool {
+        let of_others = |(kinds, keys): &(&[Self], &[&str])| keys.contains(&key) && !kinds.contains(&self);
+        !Self::KEYS.iter().any(of_others)
+    }
+}
 
 impl TargetSpec {
     /// Keys of which a virtual view has one at most.

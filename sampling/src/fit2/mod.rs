@@ -88,9 +88,6 @@ pub struct Fit2<const ORDER: usize, const C: usize> {
 }
 
 impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
-    /// Couplings of a coefficient that samples cause, its own included.
-    const COUPLINGS: usize = 1 + rows::reach(ORDER) * (2 * rows::reach(ORDER) + 2);
-
     /// An empty problem for an image of `width` x `height` pixels.
     pub fn new(width: usize, height: usize) -> Self {
         const { assert!(ORDER == 2 || ORDER == 4, "the fit of an image is bilinear or bicubic") }
@@ -110,13 +107,27 @@ impl<const ORDER: usize, const C: usize> Fit2<ORDER, C> {
         Fit2Rows::new(self.size, self.matrix.planes_mut().all_rows(), self.rhs.all_rows())
     }
 
-    /// Weight of the samples at a coefficient, the sum of its row in the normal equations without
-    /// regularisation, and their weighted values; their ratio is the mean of the samples around it.
-    pub fn local_sums(&self, coefficient: usize) -> (f32, [f32; C]) {
-        let width = self.matrix.grid().width;
-        let (x, y) = (coefficient % width, coefficient / width);
-        let weight = self.matrix.row_sum(x, y, Self::COUPLINGS);
-        (weight, std::array::from_fn(|c| self.rhs.row(y, c)[x]))
+    /// Weights of the samples at all coefficients, row by row: the sums of the rows of the normal equations
+    /// without regularisation.
+    pub fn weights(&self) -> Vec<f32> {
+        let (width, stride) = (self.matrix.grid().width, self.matrix.grid().stride());
+        let mut weights = vec![0.0; self.matrix.grid().len()];
+        let rows = weights.par_chunks_mut(width.max(1)).enumerate().with_min_len(ROWS_AT_ONCE);
+        rows.for_each_init(
+            || vec![0.0; stride],
+            |sums, (y, weights)| {
+                self.matrix.row_sums(y, sums);
+                weights.copy_from_slice(&sums[..width]);
+            },
+        );
+        weights
+    }
+
+    /// Weighted values of the samples at a coefficient; their ratio to its weight is the mean of the samples
+    /// around it.
+    pub fn weighted_values(&self, coefficient: usize) -> [f32; C] {
+        let (x, y) = (coefficient % self.matrix.grid().width, coefficient / self.matrix.grid().width);
+        std::array::from_fn(|c| self.rhs.row(y, c)[x])
     }
 
     /// Adds springs to the equations. `springs` gives those of one direction that begin in one row of the

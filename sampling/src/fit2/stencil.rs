@@ -120,16 +120,6 @@ impl Stencil {
         }
     }
 
-    /// The same for one coefficient, with the first couplings only.
-    pub(super) fn row_sum(&self, x: usize, y: usize, couplings: usize) -> f32 {
-        let at = |start: usize| self.planes.data()[start + x];
-        let sum = |(k, offset): (usize, &Offset)| {
-            let earlier = self.planes.before(y, k, *offset).filter(|_| k > 0);
-            at(self.planes.start(y, k)) + earlier.map_or(0.0, at)
-        };
-        self.offsets[..couplings].iter().enumerate().map(sum).sum()
-    }
-
     /// The matrix of blocks of 2 x 2 coefficients that move together: the sums of the entries between the
     /// blocks.
     pub(super) fn coarsened(&self) -> Self {

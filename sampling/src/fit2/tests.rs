@@ -205,7 +205,7 @@ fn without_springs_down_rows_are_fits() {
     }
 }
 
-/// A 1 and the local sums are sums of the rows.
+/// A 1 and the weights are sums of the rows.
 #[test]
 fn sums_of_rows() {
     let size = (9, 5);
@@ -221,7 +221,7 @@ fn sums_of_rows() {
     for y in 0..height {
         matrix.row_sums(y, &mut sums);
         for (x, (want, sum)) in image.row(y, 0).iter().zip(&sums).enumerate() {
-            let local = fit.local_sums(y * width + x).0;
+            let local = fit.weights()[y * width + x];
             assert!((sum - want).abs() < 1e-4 && (local - want).abs() < 1e-4, "{x} {y}: {local} {want}");
         }
     }

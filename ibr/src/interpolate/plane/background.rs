@@ -44,6 +44,33 @@ pub(super) fn sources(depth: &[f32], width: usize, test: &DepthTest) -> Vec<u32>
     sources
 }
 
+/// The pixels of cracks, each with the mean of the nearest known pixels around it, weighed by the inverse of
+/// their distance; none where nothing is known.
+pub(super) fn bridged<const C: usize>(
+    depth: &[f32],
+    width: usize,
+    mask: &[Cover],
+    value: impl Fn(usize) -> [f32; C],
+) -> Vec<(usize, [f32; C])> {
+    let mut bridged = Vec::new();
+    for_holes(depth, width, |p, around| {
+        if mask[p] != Cover::Crack {
+            return;
+        }
+        let (mut sum, mut total) = ([0.0; C], 0.0);
+        for q in around.into_iter().filter(|q| *q != NONE).map(|q| q as usize) {
+            let away = q.abs_diff(p);
+            let weight = 1.0 / if away < width { away } else { away / width } as f32;
+            total += weight;
+            sum.iter_mut().zip(value(q)).for_each(|(sum, v)| *sum += weight * v);
+        }
+        if total > 0.0 {
+            bridged.push((p, sum.map(|sum| sum / total)));
+        }
+    });
+    bridged
+}
+
 /// A pixel of known depth is seen. A hole is a crack if known pixels of one depth lie on both sides of it
 /// in a row or column and no neighbour has another depth, else a disocclusion.
 pub(super) fn classify(depth: &[f32], width: usize, test: &DepthTest) -> Vec<Cover> {

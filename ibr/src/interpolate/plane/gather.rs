@@ -140,8 +140,8 @@ impl<const ORDER: usize, const C: usize> PlaneProblem<ORDER, C> {
         self
     }
 
-    pub(super) fn add_on_pixel(&mut self, pixel: usize, values: [f32; C]) {
+    pub(super) fn add_on_pixel(&mut self, pixel: usize, values: [f32; C], weight: f32) {
         let (x, y) = ((pixel % self.width) as f64, (pixel / self.width) as f64);
-        self.fit.rows().add(&Fit2Sample { x, y, values, weight: 1.0 });
+        self.fit.rows().add(&Fit2Sample { x, y, values, weight });
     }
 }

@@ -11,7 +11,7 @@ use crate::files::InputError;
 use crate::image::{image_size, read_map};
 use crate::pipeline::calibrated::QUARTILES;
 use crate::pipeline::nearness::{AT_HAND, Placed, choose};
-use crate::scene::spec::MapSource;
+use crate::scene::spec::{MapSource, SceneKind};
 use crate::scene::{Kind, ViewSpec};
 use hybank_core::messages::Quoted;
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
@@ -62,7 +62,7 @@ impl Loader<'_> {
         goals: &[Goal],
     ) -> Loaded<Inputs> {
         self.a_camera_each()?;
-        self.keys_of(views, goals, "calibrated")?;
+        self.keys_of(views, goals, SceneKind::Calibrated)?;
         let place = |view: &&ViewSpec| {
             let size = image_size(&self.file(&view.image))?;
             let (camera, resized) = self.camera_of(view, size)?;
@@ -211,7 +211,7 @@ impl Loader<'_> {
         let source = match (&view.camera, self.source_of(view)) {
             (Some(rows), _) => return Ok((self.matrix(rows, &which)?, None)),
             (None, Some(source)) => source,
-            (None, None) => return self.need(None, view, "camera", "calibrated"),
+            (None, None) => return self.need(None, view, "camera", SceneKind::Calibrated),
         };
         let image = view.image.to_string_lossy();
         let ListedCamera { camera, size: from } = self.listed_camera(&source, &image, size, &which)?;

@@ -2,6 +2,7 @@
 
 use super::{Loaded, Loader};
 use crate::files::InputError;
+use crate::scene::spec::SceneKind;
 use crate::scene::{TargetSpec, ViewSpec};
 
 /// Most virtual views of a scene.
@@ -35,7 +36,7 @@ impl Loader<'_> {
     }
 
     /// Refuses keys of another kind of scene than this, and two keys for one thing, instead of ignoring one.
-    pub(super) fn keys_of(&self, views: &[&ViewSpec], goals: &[Goal], kind: &str) -> Loaded<()> {
+    pub(super) fn keys_of(&self, views: &[&ViewSpec], goals: &[Goal], kind: SceneKind) -> Loaded<()> {
         self.keys_of_table("the top of the file", kind, self.spec)?;
         for view in views {
             self.keys_of_table(&view.named(), kind, view)?;

@@ -2,7 +2,7 @@
 
 use super::{Loaded, Loader};
 use crate::camera::Camera;
-use crate::camera::resize::factors;
+use crate::camera::resize::{Size, factors};
 use crate::depth::{DepthError, DepthMap, Measure};
 use crate::files::InputError;
 use crate::image::{Image, read_image, read_map, read_photograph};
@@ -44,8 +44,9 @@ impl<P: Copy> Read<P> {
 }
 
 /// What to say of a photograph whose shape is that of another image after a quarter turn.
-pub(super) fn on_its_side((width, height): (usize, usize), other: (usize, usize)) -> &'static str {
-    match width != height && factors((height, width), other).is_some() {
+pub(super) fn on_its_side(photograph: Size, other: Size) -> &'static str {
+    let turned = (photograph.1, photograph.0);
+    match turned != photograph && factors(turned, other).is_some() {
         true => "; the photograph seems to lie on its side: turn its pixels as its EXIF data say",
         false => "",
     }

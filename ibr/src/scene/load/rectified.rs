@@ -2,6 +2,7 @@
 
 use super::{Goal, Inputs, Loaded, Loader, each};
 use crate::depth::Measure;
+use crate::scene::spec::SceneKind;
 use crate::scene::{Kind, SourceView, ViewSpec};
 use hybank_core::messages::Quoted;
 use std::path::Path;
@@ -13,13 +14,13 @@ impl Loader<'_> {
         left_out: Option<&ViewSpec>,
         goals: &[Goal],
     ) -> Loaded<Inputs> {
-        self.keys_of(views, goals, "rectified")?;
+        self.keys_of(views, goals, SceneKind::Rectified)?;
         let positions = match left_out {
             Some(view) => vec![self.virtual_position(view.position, "[virtual]")?],
             None => self.positions(goals)?,
         };
         let one = |view: &&ViewSpec| {
-            let position = self.need(view.position, view, "position", "rectified")?;
+            let position = self.need(view.position, view, "position", SceneKind::Rectified)?;
             let position = self.finite(position, &view.named())?;
             let no_points = || {
                 let map = view.disparity.as_deref().unwrap_or(Path::new(""));

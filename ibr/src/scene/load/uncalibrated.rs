@@ -2,6 +2,7 @@
 
 use super::{Goal, Inputs, Loaded, Loader, each};
 use crate::pipeline::uncalibrated::Target;
+use crate::scene::spec::SceneKind;
 use crate::scene::{Kind, ViewSpec};
 use crate::uncalibrated::Point;
 use crate::uncalibrated::tracks::Tracks;
@@ -16,7 +17,7 @@ impl Loader<'_> {
         goals: &[Goal],
     ) -> Loaded<Inputs> {
         let file = self.matches_file(views)?;
-        self.keys_of(views, goals, "matches-only")?;
+        self.keys_of(views, goals, SceneKind::MatchesOnly)?;
         let tracks = Tracks::read(&self.file(file))?;
         let virtual_columns = match left_out {
             Some((index, view)) => vec![view.column.unwrap_or(index + 1)],
