@@ -171,7 +171,7 @@ fn offsets_that_do_not_fit_are_refused() {
 /// By the definition of Chebyshev's polynomials, cos(k acos x), in both number types.
 #[test]
 fn nonlinearities_are_subtracted_at_the_sample_as_it_is() {
-    let curves = vec![vec![1e-3, -2e-3, 0.0, 5e-4], vec![], vec![-4e-3]];
+    let curves = [vec![1e-3, -2e-3, 0.0, 5e-4], vec![], vec![-4e-3]];
     let offsets = [0.01, 0.0, -0.02];
     let frames: Vec<f64> = (0..3 * 200).map(|n| 1.1 * (0.37 * f64::from(n)).sin()).collect();
     let straight = |(n, &x): (usize, &f64)| {
