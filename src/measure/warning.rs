@@ -1,6 +1,7 @@
 //! What a reader of a measurement must know beside its figures.
 
 use super::{Cause, Measurement, Spur, UnsettledEnds};
+use crate::quantity::readable;
 use crate::units::{Decibels, Hertz};
 
 /// No error of a converter that is in order is larger, relative to the tone.
@@ -46,7 +47,7 @@ pub enum MeasureWarning {
     /// Lines that nothing explains and that are nearly as large as the tone.
     #[error(
         "lines nearly as large as the tone count as its distortion: {}; if they were played, name all tones",
-        .0.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+        .0.iter().map(|tone| readable(tone.0, "Hz")).collect::<Vec<_>>().join(", ")
     )]
     OtherTones(Vec<Hertz>),
     /// The ends of the record hold most of the noise.
