@@ -45,7 +45,7 @@ pub(super) struct InstantArgs {
 /// The option that `fuse` and `stream` have.
 #[derive(Debug, clap::Args)]
 pub(super) struct TrackArgs {
-    /// Follow what changes: the lines of `calibrate --drift` or `align --trim`, or a table (.csv)
+    /// Follow what changes: a table (.csv), or what `align --trim` or `calibrate --drift` wrote
     ///
     /// The table has a time and the delay of each channel, both in seconds, with headings, as
     /// `time,delay 1,delay 2`. Columns with the gain of each channel, and then with its offset, may follow.

@@ -223,7 +223,9 @@ fn at_rate(source: &Recorder, own: Hertz) -> Result<Record, MergeError> {
     let spectrum = Spectrum::flat(band, settings.longest(&recordings));
     let converters = vec![Converter::exact(0, 1.0, 1e-6)];
     let estimator = Estimator::new(Signals::new(&spectrum, &[&|_| Complex::from(1.0)], 0, converters));
-    Ok(Record::new(fuse(&estimator, &recordings, settings)?.samples))
+    // The mean again, as it is among what is compared.
+    let samples = fuse(&estimator, &recordings, settings)?.samples;
+    Ok(Record::new(samples.into_iter().map(|x| x + level).collect()))
 }
 
 /// Recorders of one rate with equal front ends; time is in their periods.

@@ -60,6 +60,21 @@ fn two_recorders_resolve_what_none_of_them_does() {
     assert!(merged.quality.sufficient().is_none());
 }
 
+/// The mean of all recordings is in the result once, whatever their rates.
+#[test]
+fn a_constant_is_in_the_result_once() {
+    let at = |rate: f64, name, seed| {
+        let count = (6.0 * rate) as u32;
+        let mut source = source(name, 1.0, (0..count).map(|k| f64::from(k) / rate), seed);
+        source.record.samples.iter_mut().for_each(|x| *x += 0.3);
+        Recorder { rate: Hertz(rate), ..source }
+    };
+    let merged = merge(&[at(7000.0, "a", 1), at(8000.0, "b", 2)], SETTINGS).unwrap();
+    let inner = &merged.samples[400..merged.samples.len() - 400];
+    let mean = inner.iter().sum::<f64>() / inner.len() as f64;
+    assert!((mean - 0.3).abs() < 1e-3, "{mean}");
+}
+
 /// Stamps off by up to 30 % of their period are fused as they are.
 #[test]
 fn stamps_say_when_samples_were_taken() {
