@@ -18,7 +18,7 @@ most=1500000
 crates=(hybank-linalg hybank-runtime hybank-sampling hybank-core hybank-instants hybank-verify hybank-design hybank-program hybank hybank-ibr hybank-cli)
 
 # crates.io takes five keywords of 20 characters.
-if grep -nE '^keywords = ([^]]*$|.*"[^",]{21,}"|(.*,){5})' {.,linalg,runtime,sampling,core,program,ibr,cli}/Cargo.toml; then
+if grep -nE '^keywords = ([^]]*$|.*"[^",]{21,}"|(.*,){5})' {.,linalg,runtime,sampling,core,instants,verify,design,program,ibr,cli}/Cargo.toml; then
     echo "release: crates.io takes at most five keywords, each of at most 20 characters; give them in one line" >&2
     exit 1
 fi
@@ -29,10 +29,10 @@ git ls-files -z --cached --others --exclude-standard | xargs -0 cp --parents --n
 cd "$folder"
 
 sed -i "s|^# .repository. is set.*|repository = \"$address\"|" Cargo.toml
-sed -i 's|^license\.workspace = true|&\nrepository.workspace = true|' {.,linalg,runtime,sampling,core,program,ibr,cli}/Cargo.toml
+sed -i 's|^license\.workspace = true|&\nrepository.workspace = true|' {.,linalg,runtime,sampling,core,instants,verify,design,program,ibr,cli}/Cargo.toml
 sed -i "s|^\[project.optional-dependencies\]|[project.urls]\nRepository = \"$address\"\nChangelog = \"$address/blob/v$version/CHANGELOG.md\"\n\n&|" pyproject.toml
 # The pages of the registries, each with the folder from which its links lead.
-for page in README.md {linalg,runtime,sampling,core,program,ibr}/README.md docs/python.md; do
+for page in README.md {linalg,runtime,sampling,core,instants,verify,design,program,ibr}/README.md docs/python.md; do
     base=$(dirname "$page")/
     # A picture is the file itself, not the page around it.
     sed -Ei "s|(!\[[^]]*\]\()([A-Za-z0-9_./-]+)\)|\1${address}/raw/v$version/${base#./}\2)|g" "$page"
