@@ -11,6 +11,7 @@ use crate::linalg::Complex;
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
 use crate::units::{CyclesPerFastPeriod, FastPeriods, Hertz, Seconds};
+use std::ops::RangeInclusive;
 
 /// Samples between two knots of a clock: its rate is constant over them.
 const KNOT_EVERY: usize = 256;
@@ -20,6 +21,8 @@ const SAME_RATE: f64 = 0.001;
 const REACH: usize = 16;
 /// The part of the lower one of two rates that is kept of a signal.
 const KEPT: f64 = 0.45;
+/// Means that differ by more standard deviations of the means of white samples differ by a bias.
+const BIAS_SIGMAS: f64 = 3.0;
 
 /// Recordings with their clocks, in periods of the output.
 pub(super) struct Clocked {
@@ -96,6 +99,39 @@ fn alone(source: &Recorder, rate: Hertz) -> Clocked {
     }
 }
 
+/// Number, mean and variance of the usable samples of a source whose stamps lie in a span.
+struct SpanMean {
+    count: f64,
+    mean: f64,
+    variance: f64,
+}
+
+impl SpanMean {
+    /// `None` of fewer than two samples.
+    fn new(source: &Recorder, span: &RangeInclusive<f64>) -> Option<Self> {
+        let all = source.stamps.iter().flatten().zip(usable(&source.record).0);
+        let there = all.filter(|(stamp, x)| span.contains(&stamp.0) && x.is_finite()).map(|(_, x)| x);
+        let samples: Vec<f64> = there.collect();
+        let count = samples.len() as f64;
+        let mean = samples.iter().sum::<f64>() / count;
+        let variance = samples.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count;
+        (samples.len() > 1).then_some(Self { count, mean, variance })
+    }
+}
+
+/// A mean over the time that two sources have in common that differs by more than chance.
+fn bias(first: &Recorder, source: &Recorder) -> Option<MergeWarning> {
+    let ends =
+        |source: &Recorder| Some([source.stamps.as_ref()?.first()?.0, source.stamps.as_ref()?.last()?.0]);
+    let [[begin, end], [own_begin, own_end]] = [ends(first)?, ends(source)?];
+    let span = begin.max(own_begin)..=end.min(own_end);
+    let (usual, own) = (SpanMean::new(first, &span)?, SpanMean::new(source, &span)?);
+    let bias = own.mean - usual.mean;
+    let by_chance = (usual.variance / usual.count + own.variance / own.count).sqrt();
+    let named = || MergeWarning::Bias { name: source.name.clone(), first: first.name.clone(), bias };
+    (bias.abs() > BIAS_SIGMAS * by_chance).then(named)
+}
+
 fn by_stamps(sources: &[Recorder], rate: Hertz) -> Result<Clocked, MergeError> {
     let stamps = |source: &Recorder| source.stamps.clone().unwrap_or_default();
     let origin = stamps(&sources[0]).first().copied().unwrap_or(Seconds(0.0));
@@ -118,7 +154,7 @@ fn by_stamps(sources: &[Recorder], rate: Hertz) -> Result<Clocked, MergeError> {
         gain_deviations: vec![0.0; count],
         delay_deviations: vec![FastPeriods(0.0); count],
         level,
-        warnings: Vec::new(),
+        warnings: sources[1..].iter().filter_map(|source| bias(&sources[0], source)).collect(),
     })
 }
 

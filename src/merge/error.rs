@@ -148,4 +148,19 @@ pub enum MergeWarning {
         /// How many.
         clipped: usize,
     },
+    /// Means that differ, of sources with stamps: nothing else says which part of them is no signal.
+    #[error(
+        "the mean of {} differs by {bias:.4} from that of {} over the time that both cover, and counts as signal; subtract \
+         it from the samples if it is a bias of the sensor",
+        Quoted(.name),
+        Quoted(.first)
+    )]
+    Bias {
+        /// The source.
+        name: String,
+        /// The first source.
+        first: String,
+        /// By how much its mean is above that of the first.
+        bias: f64,
+    },
 }

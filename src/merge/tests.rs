@@ -1,6 +1,6 @@
 //! Recordings of sums of cosines, which are exact at any instant.
 
-use super::{MergeError, MergeSettings, Merged, Recorder, merge};
+use super::{MergeError, MergeSettings, MergeWarning, Merged, Recorder, merge};
 use crate::calibrate::Record;
 use crate::random::Random;
 use crate::units::{Hertz, Seconds};
@@ -73,6 +73,22 @@ fn a_constant_is_in_the_result_once() {
     let inner = &merged.samples[400..merged.samples.len() - 400];
     let mean = inner.iter().sum::<f64>() / inner.len() as f64;
     assert!((mean - 0.3).abs() < 1e-3, "{mean}");
+}
+
+/// Two loggers of one signal, one of them with a bias.
+#[test]
+fn a_bias_is_named_and_its_absence_is_not() {
+    let logger = |name, begin: f64, bias: f64, seed| {
+        let stamps: Vec<f64> = (0..8000).map(|k| begin + f64::from(k) / 4000.0).collect();
+        let mut logger = source(name, 1.0, stamps.iter().copied(), seed);
+        logger.record.samples.iter_mut().for_each(|x| *x += 9.81 + bias);
+        Recorder { stamps: Some(stamps.into_iter().map(Seconds).collect()), ..logger }
+    };
+    let merged = |bias| merge(&[logger("a", 0.0, 0.0, 1), logger("b", 0.5001, bias, 2)], SETTINGS).unwrap();
+    assert_eq!(merged(0.0).warnings, []);
+    let warnings = merged(0.05).warnings;
+    let [MergeWarning::Bias { name, first, bias }] = &warnings[..] else { panic!("{warnings:?}") };
+    assert!(name == "b" && first == "a" && (bias - 0.05).abs() < 0.01, "{warnings:?}");
 }
 
 /// Stamps off by up to 30 % of their period are fused as they are.

@@ -159,11 +159,11 @@ fn of_target_and_channels(bank: &Bank, title: &str, frequencies: &[Hertz], all: 
             .collect(),
     };
     let count = 1 + bank.channel_count().min(MOST_CHANNELS - 1);
-    over_decades(bank, title, (factor, x_label), (0..count).map(curve).collect())
+    over_decades(bank, title, factor, x_label, (0..count).map(curve).collect())
 }
 
 /// Gains over decades of the frequency, with what limits the signal.
-fn over_decades(bank: &Bank, title: &str, (factor, x_label): (f64, String), series: Vec<Series>) -> Chart {
+fn over_decades(bank: &Bank, title: &str, factor: f64, x_label: String, series: Vec<Series>) -> Chart {
     let guides = limits(bank).into_iter().map(|(label, at)| Guide { label, x: at.0 * factor }).collect();
     Chart { x_scale: AxisScale::Decades, guides, ..Chart::lines(title, x_label, "gain, dB", series) }
 }
@@ -217,7 +217,7 @@ fn gains(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
     let frequencies = decades(nyquist(bank));
     let (x_label, series) =
         by_frequency(bank, responses, &frequencies, |response, _| decibels(response.norm()));
-    over_decades(bank, "Gain of the synthesis filters", (axis(nyquist(bank)).0, x_label), series)
+    over_decades(bank, "Gain of the synthesis filters", axis(nyquist(bank)).0, x_label, series)
 }
 
 fn group_delays(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
