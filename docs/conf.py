@@ -1,6 +1,8 @@
 """The site made from the pages of the repository by `tools/site.sh`. No text is copied: Sphinx reads the
 pages where they lie, so their links work here and in the repository alike."""
 
+from pathlib import Path
+
 project = "hybank"
 author = "the hybank developers"
 copyright = author
@@ -32,3 +34,13 @@ numpydoc_show_class_members = False
 
 html_theme = "furo"
 html_title = "hybank"
+
+
+def setup(app):
+    """Appends the lists of pages to the first one: in the repository that page is read without them."""
+
+    def append(app, page, source):
+        if page == root_doc:
+            source[0] += "\n" + Path(__file__).with_name("contents.myst").read_text()
+
+    app.connect("source-read", append)

@@ -158,6 +158,7 @@ fn option(error: &dyn Any) -> Option<&'static str> {
         .or_else(|| of_calibration(error.downcast_ref()?))
         .or_else(|| match error.downcast_ref()? {
             CalibrationWarning::CutoffExplains { .. } => Some("--fit takes that list"),
+            CalibrationWarning::MoreTones { .. } => Some("--blind does that"),
             CalibrationWarning::OffsetBinary => Some("--full-scale u8bits does the same"),
             _ => None,
         })

@@ -2,6 +2,7 @@
 
 use super::error::list;
 use super::fit::FittedValues;
+use crate::messages::counted;
 use crate::spec::Cutoff;
 use crate::units::{FastPeriods, Hertz};
 
@@ -52,7 +53,8 @@ pub enum CalibrationWarning {
     /// The tones contradict each other by more than their noise, so all intervals were widened.
     #[error(
         "the tones contradict each other {misfit:.1} times as much as their noise explains, and the intervals were \
-         widened by that; the front ends may differ from those of the spec"
+         widened by that; the front ends may differ from those of the spec, or the noise is so far below a step of the \
+         converters that their rounding is none"
     )]
     TonesDisagree {
         /// The factor.
@@ -155,10 +157,20 @@ pub enum CalibrationWarning {
         /// Their number.
         count: usize,
     },
+    /// As many tones were found as are looked for.
+    #[error(
+        "there may be more than the {most} strongest tones that are looked for, and the others count as noise; name them \
+         all, or calibrate blind"
+    )]
+    MoreTones {
+        /// Those looked for.
+        most: usize,
+    },
     /// All delays, and the latency, were raised so that none is negative.
     #[error(
-        "fast periods added to all delays and to the latency, because a delay would be negative: {periods}; the output without \
-         its latency begins with the sample as many fast periods after the first"
+        "a delay would be negative, so {} were added to all delays and to the latency: the fused file begins that much \
+         later than the captures",
+        counted(periods, "fast period")
     )]
     Shifted {
         /// Whole fast periods.

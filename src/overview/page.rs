@@ -85,15 +85,18 @@ impl CapturesOnPage {
         let (spectra, measured) = match measured {
             Ok(measured) => {
                 let chart = before_after(&measured.before, &measured.after);
-                let caption = format!("{what} Each cause of spurs has one colour.");
+                let caption = format!(
+                    "{what} Rings mark what the first has beside the tone, discs what the second has. Each cause has \
+                     one colour; Hn is harmonic n of the tone f, and k/M a part of the rate."
+                );
                 (CaptionedChart::new(&chart, &caption), Some(measured))
             }
             Err(reason) => {
                 let plain = interleaved(&bank.sample_delays(), bank.ratio, bank.wait(), &channels);
                 let chart = spectra(rate, &[("plain interleaving", &plain[..]), ("fused", &fused)]);
                 let caption = format!(
-                    "{what} Lines that only the first has are images of the signal: errors of the converters' \
-                     instants and filters. No tone was measured ({reason})."
+                    "{what} Lines that only the first has are errors of the converters: at multiples of the slow rate \
+                     their offsets, elsewhere images of the signal by their instants, gains and filters. No tone was measured ({reason})."
                 );
                 (CaptionedChart::new(&chart, &caption), None)
             }

@@ -24,6 +24,8 @@ const FLOOR_DB: f64 = -200.0;
 const PASS_BAND_DB: f64 = 60.0;
 /// Channels that a picture shows.
 const MOST_CHANNELS: usize = 6;
+/// The smallest tap that a picture shows, relative to the largest.
+const SEEN: f64 = 1e-3;
 /// Largest error of a delay that is drawn, and the points up to it on either side.
 const DELAY_ERROR: FastPeriods = FastPeriods(0.02);
 const DELAY_ERRORS: i32 = 5;
@@ -251,13 +253,21 @@ fn pass_band(bank: &Bank, responses: &[Vec<f64>]) -> f64 {
 }
 
 fn impulses(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
+    let seen = seen(responses);
     let curve = |(label, taps): (String, &Vec<f64>)| Series {
         label,
-        points: taps.iter().enumerate().map(|(n, tap)| (n as f64, *tap)).collect(),
+        points: taps.iter().take(seen).enumerate().map(|(n, tap)| (n as f64, *tap)).collect(),
     };
     let series = filter_names(bank).into_iter().zip(responses).take(MOST_CHANNELS).map(curve).collect();
     let chart = Chart::lines("Impulse responses of the synthesis filters", "fast samples", "tap", series);
     Chart { curves: Curves::Stems, ..chart }
+}
+
+/// The fast samples after which no response can be seen: a recursive filter goes on without end.
+fn seen(responses: &[Vec<f64>]) -> usize {
+    let largest = responses.iter().flatten().fold(0.0, |most: f64, tap| most.max(tap.abs()));
+    let last = |taps: &Vec<f64>| taps.iter().rposition(|tap| tap.abs() >= SEEN * largest);
+    responses.iter().filter_map(last).max().map_or(0, |last| last + 1)
 }
 
 fn error(bank: &Bank) -> Result<Chart, DesignError> {

@@ -295,6 +295,9 @@ fn found(
 ) -> Result<(Vec<Hertz>, Vec<usize>), CalibrateError> {
     let (rate, channels, frames) = (model.slow_rate(), captures.channels(), captures.frames());
     let aliases = sine_fit::find_tones(&channels, rate, MOST_TONES, TONE_RANGE)?;
+    if aliases.len() == MOST_TONES {
+        warnings.push(CalibrationWarning::MoreTones { most: MOST_TONES });
+    }
     let sines = sine_fit::fit(&channels, rate, &aliases)?;
     let directions: Vec<Sense> = (0..sines.tones()).map(|t| captures.direction(&sines, t)).collect();
     let signed = sines.frequencies.iter().zip(&directions);

@@ -189,6 +189,18 @@ fn harmonics_on_the_tone_and_few_phases_are_noted() {
 /// Quantisation to 8 bits of a tone with 25 phases errs by the same amount however long the record is: the
 /// intervals say so.
 #[test]
+fn more_tones_than_are_looked_for_are_named() {
+    let spec = interleaved();
+    let comb: Vec<f64> = (0..20).map(|k| 7_130.0 + 19_370.0 * f64::from(k)).collect();
+    for (count, is_named) in [(20, true), (6, false)] {
+        let records = tones(&spec, &hertz(&comb[..count]), 8192, 1e-6, &mut Random(5));
+        let found = by_tones(&spec, &records, &[]).unwrap();
+        let named = |warning: &_| matches!(warning, CalibrationWarning::MoreTones { most: 16 });
+        assert_eq!(found.warnings.iter().any(named), is_named, "{count} tones: {:?}", found.warnings);
+    }
+}
+
+#[test]
 fn intervals_cover_where_quantisation_repeats() {
     let spec = interleaved();
     let (mut dice, mut scaled, tone) = (Random(11), Vec::new(), 250e3 * 7.0 / 25.0);
