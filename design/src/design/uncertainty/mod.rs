@@ -18,8 +18,7 @@ mod study;
 mod widths;
 
 pub use study::BoxStudy;
-pub use widths::in_field;
-pub use widths::{BoxRule, BoxWidths, ReferenceChannel, Refused, RefusedBox};
+pub use widths::{BoxWidths, ReferenceChannel};
 
 #[cfg(test)]
 mod tests;
