@@ -40,11 +40,8 @@ fn errors_of_cut_offs_are_those_of_other_front_ends() {
     }
     let args = ["simulate", "single.toml", "--source", "tones:7kHz", "-o", "new"];
     desk.refused(1, &[&args[..], &error].concat(), &["--cutoff-error", "cutoff:2", "no such stage"]);
-    desk.refused(
-        1,
-        &[&args[..], &["--cutoff-error", "0.6"]].concat(),
-        &["--cutoff-error: 0.6", "-0.5 to 0.5"],
-    );
+    let wide = [&args[..], &["--cutoff-error", "0.6"]].concat();
+    desk.refused(1, &wide, &["--cutoff-error: 0.6", "-0.5 to 0.5"]);
 }
 
 #[test]

@@ -265,9 +265,6 @@ fn sections_are_the_bank_and_carry_its_gamma() {
     }
     let desk = Desk::with_spec(THESIS);
     desk.good(&["design", "spec.toml", "-o", "b.json"]);
-    desk.refused(
-        1,
-        &["export", "b.json", "--format", "sos", "-o", "s.csv"],
-        &["b.json", "no poles", "csv and mat"],
-    );
+    let sections = ["export", "b.json", "--format", "sos", "-o", "s.csv"];
+    desk.refused(1, &sections, &["b.json", "no poles", "csv and mat"]);
 }

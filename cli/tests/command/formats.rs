@@ -110,11 +110,8 @@ fn captures_of_matlab_are_fused() {
     assert!(floats(&streamed.stdout) == want, "{streamed:?}");
     let measured = desk.report(&["measure", "compressed.mat", "--channel", "1", "--harmonics", "1"]);
     assert_eq!(measured["rate_hertz"], 24_000.0, "{measured}");
-    desk.refused(
-        1,
-        &["fuse", "bank.json", "several.mat", "-o", "n.wav"],
-        &["choose one, as several.mat:left"],
-    );
+    let several = ["fuse", "bank.json", "several.mat", "-o", "n.wav"];
+    desk.refused(1, &several, &["choose one, as several.mat:left"]);
     let same = ["fuse", "bank.json", "several.mat:left", "several.mat:right", "-o", "several.mat", "--force"];
     desk.refused(1, &same, &["several.mat"]);
 }

@@ -1,6 +1,6 @@
 //! Converters with rates of their own, from the spec to the fused recording, as a user runs it.
 
-use crate::support::{Desk, bytes, text, wav};
+use crate::support::{Desk, bytes, text, wav, words};
 use serde_json::Value;
 
 /// 24 kHz and 16 kHz into 48 kHz; frames of 6 samples from 3 and 2.
@@ -170,21 +170,13 @@ fn lost_samples_count_for_their_converter() {
 fn recordings_must_have_the_rates_of_their_converters() {
     let desk = desk();
     captured(&desk, &["--samples", "600"]);
-    desk.refused(
-        1,
-        &["fuse", "bank.json", "cap/ch2.wav", "cap/ch1.wav", "-o", "x.wav"],
-        &["ch2.wav", "16000 Hz", "24000 Hz", "in the order"],
-    );
-    desk.refused(
-        1,
-        &["fuse", "bank.json", "cap/ch1.wav", "-o", "x.wav"],
-        &["converters with rates of their own"],
-    );
-    desk.refused(
-        2,
-        &["fuse", "bank.json", "cap/ch1.wav", "-o", "x.wav", "--interleaved", "2"],
-        &["rates of their own"],
-    );
+    for (code, inputs, parts) in [
+        (1, "cap/ch2.wav cap/ch1.wav", &["ch2.wav", "16000 Hz", "24000 Hz", "in the order"][..]),
+        (1, "cap/ch1.wav", &["converters with rates of their own"]),
+        (2, "cap/ch1.wav --interleaved 2", &["rates of their own"]),
+    ] {
+        desk.refused(code, &words(&format!("fuse bank.json -o x.wav {inputs}")), parts);
+    }
 }
 
 /// Delays, gains and offsets per converter, from recordings at their own rates.
@@ -218,11 +210,8 @@ fn converters_of_unequal_rates_are_calibrated_by_tones() {
     let found = desk.report(&["calibrate", "spec.toml", "cap/ch1.wav", "cap/ch2.wav", "-o", "found.toml"]);
     assert!(found["misfit"].as_f64().unwrap() < 2.0, "{found}");
     assert_eq!(found["tones"].as_array().unwrap().len(), 3, "{found}");
-    desk.refused(
-        1,
-        &["calibrate", "spec.toml", "cap/ch1.wav", "cap/ch2.wav", "--blind", "-o", "x.toml"],
-        &["by tones"],
-    );
+    let blind = "calibrate spec.toml cap/ch1.wav cap/ch2.wav --blind -o x.toml";
+    desk.refused(1, &words(blind), &["by tones"]);
 }
 
 /// Errors of one converter are one number on the command line.

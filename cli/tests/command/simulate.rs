@@ -26,11 +26,8 @@ fn every_source_is_captured_and_fused() {
         let snr = wav::snr_db(&fused, &wav::samples(&desk, "cap/target.wav"), 60);
         assert!(snr > least, "{source}: {snr:.1} dB");
     }
-    desk.refused(
-        1,
-        &["simulate", "bank.json", "--source", "step@0.3", "-o", "cap"],
-        &["cap/ch1.wav", "file exists", "--force"],
-    );
+    let again = ["simulate", "bank.json", "--source", "step@0.3", "-o", "cap"];
+    desk.refused(1, &again, &["cap/ch1.wav", "file exists", "--force"]);
 }
 
 #[test]
