@@ -5,7 +5,7 @@
 //! the widest one. Each fast sample takes N K multiply-adds, K = taps / M. Every row is the best of many
 //! repeats, and so is the peak, which is measured again beside each row.
 
-use hybank::bank::{Bank, StateMatrices, SynthesisFilters};
+use hybank::bank::{Bank, SynthesisFilters};
 use hybank::io::{PcmFormat, PcmFrames, SampleLayout};
 use hybank::runtime::{
     Algorithm, Interleaved, Isa, Options, PcmOutput, Precision, Stream, ThreadPool, multiply_add_chains,
@@ -21,28 +21,6 @@ const ROW: Duration = Duration::from_millis(100);
 fn fir(n: usize, m: usize, taps: usize) -> Bank {
     let f = |i: usize| (0..taps).map(|t| ((t * 7 + i * 3) % 11) as f64 / 11.0 - 0.5).collect();
     Bank::bare(SynthesisFilters::Fir((0..n).map(f).collect()), m)
-}
-
-/// 16 second-order sections in parallel, four channels.
-fn recursion() -> Bank {
-    let n = 32;
-    let entry = |i: usize, j: usize| match () {
-        () if i == j => 0.9,
-        () if i / 2 == j / 2 => {
-            if i < j {
-                -0.3
-            } else {
-                0.3
-            }
-        }
-        () => 0.0,
-    };
-    let matrix = |rows: usize, cols: usize| (0..rows).map(|i| vec![0.1 / (1 + i) as f64; cols]).collect();
-    let a = (0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect();
-    Bank::bare(
-        SynthesisFilters::StateSpace(StateMatrices { a, b: matrix(n, 4), c: matrix(4, n), d: matrix(4, 4) }),
-        4,
-    )
 }
 
 fn input(n: usize, frames: usize) -> Vec<f32> {
@@ -74,6 +52,10 @@ struct Table {
 impl Table {
     fn options(&self) -> Options {
         Options { isa: self.isa, ..Options::default() }
+    }
+
+    fn direct(&self) -> Options {
+        Options { algorithm: Algorithm::Direct, ..self.options() }
     }
 
     fn wants(&self, name: &str) -> bool {
@@ -114,10 +96,10 @@ impl Table {
         for (name, n, m, taps) in CASES {
             self.fir(&format!("{name}: f32"), n, m, taps, Algorithm::Direct, FRAMES);
             self.fir(&format!("{name}: f32, 64 frames per call"), n, m, taps, Algorithm::Direct, 64);
-            self.doubles(&format!("{name}: f64"), n, m, taps, Algorithm::Direct);
+            self.doubles(&format!("{name}: f64"), n, m, taps);
             self.pcm(&format!("{name}: s16le in and out"), n, m, taps);
-            self.threads(&format!("{name}: f32, two threads"), n, m, taps, Algorithm::Direct);
-            self.blocks(&format!("{name}: f32, overlap-save"), n, m, taps);
+            self.threads(&format!("{name}: f32, two threads"), n, m, taps);
+            self.fir(&format!("{name}: f32, overlap-save"), n, m, taps, Algorithm::OverlapSave, FRAMES);
             self.worst(name, n, m, taps);
         }
     }
@@ -143,20 +125,9 @@ impl Table {
         }
     }
 
-    /// Overlap-save; the products are those of the direct algorithm.
-    fn blocks(&self, name: &str, n: usize, m: usize, taps: usize) {
-        let options = Options { algorithm: Algorithm::OverlapSave, ..self.options() };
-        let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
-        let x = input(n, FRAMES);
-        let mut y = vec![0.0; m * FRAMES];
-        self.row(name, m * FRAMES, (n * taps) as f64 / m as f64, || {
-            stream.process(black_box(&x), &mut y).unwrap();
-        });
-    }
-
     /// In and out as f64; the peak in f64 is half the one printed.
-    fn doubles(&self, name: &str, n: usize, m: usize, taps: usize, algorithm: Algorithm) {
-        let options = Options { precision: Precision::Double, algorithm, ..self.options() };
+    fn doubles(&self, name: &str, n: usize, m: usize, taps: usize) {
+        let options = Options { precision: Precision::Double, ..self.direct() };
         let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
         let x: Vec<f64> = input(n, FRAMES).into_iter().map(f64::from).collect();
         let mut y = vec![0.0; m * FRAMES];
@@ -179,12 +150,11 @@ impl Table {
 
     /// Longer calls, as for files, by two threads; how many times one thread's speed that is, from alternate
     /// iterations.
-    fn threads(&self, name: &str, n: usize, m: usize, taps: usize, algorithm: Algorithm) {
+    fn threads(&self, name: &str, n: usize, m: usize, taps: usize) {
         if !self.wants(name) {
             return;
         }
-        let options = Options { algorithm, ..self.options() };
-        let mut stream = Stream::new(&fir(n, m, taps).plan(options).unwrap());
+        let mut stream = Stream::new(&fir(n, m, taps).plan(self.direct()).unwrap());
         let pool = ThreadPool::new(2).unwrap();
         let frames = 16 * FRAMES;
         let x = input(n, frames);
@@ -214,32 +184,14 @@ impl Table {
     fn ladder(&self) {
         for n in 1..=16 {
             for m in 1..=16 {
-                self.fir(
-                    &format!("ladder: N {n} M {m}, 16 taps per phase"),
-                    n,
-                    m,
-                    16 * m,
-                    Algorithm::Direct,
-                    FRAMES,
-                );
+                let name = format!("ladder: N {n} M {m}, 16 taps per phase");
+                self.fir(&name, n, m, 16 * m, Algorithm::Direct, FRAMES);
             }
         }
-        for taps in [2, 8, 32, 128, 512, 2048] {
-            self.fir(&format!("taps: N 2 M 2, {taps} taps"), 2, 2, taps, Algorithm::Direct, FRAMES);
+        let few = [2, 8, 32, 128, 512, 2048].map(|taps| (2, taps));
+        for (n, taps) in few.into_iter().chain([256, 512, 1024].map(|taps| (8, taps))) {
+            self.fir(&format!("taps: N {n} M {n}, {taps} taps"), n, n, taps, Algorithm::Direct, FRAMES);
         }
-        for taps in [256, 512, 1024] {
-            self.fir(&format!("taps: N 8 M 8, {taps} taps"), 8, 8, taps, Algorithm::Direct, FRAMES);
-        }
-    }
-
-    /// Recursions have no peak to compare with: frames are what counts.
-    fn recursions(&self) {
-        let mut stream = Stream::new(&recursion().plan(self.options()).unwrap());
-        let x = input(4, FRAMES);
-        let mut y = vec![0.0; 4 * FRAMES];
-        self.row("state space: 32 states, N 4 M 4", 4 * FRAMES, 0.0, || {
-            stream.process(black_box(&x), &mut y).unwrap();
-        });
     }
 }
 
@@ -256,5 +208,4 @@ fn main() {
     println!("|{:-<36}|----------|--------|---------|", "");
     table.cases();
     table.ladder();
-    table.recursions();
 }

@@ -1,11 +1,11 @@
 //! `hybank analyze`: the error of a bank, with its own delays or with others.
 
-use super::bank_file::load;
+use super::bank_file::{bad_flag, load};
 use super::design_report::{against, figure_text};
 use super::design_studies::number;
 use super::print::{Failure, InFile, show};
 use hybank::bank::Bank;
-use hybank::design::uncertainty::{BoxRule, BoxStudy, BoxWidths, ReferenceChannel, RefusedBox};
+use hybank::design::uncertainty::{BoxStudy, BoxWidths, ReferenceChannel};
 use hybank::design::{self, Analysis, DesignError, GammaScale, MeanAnalysis};
 use hybank::figures::{Figures, KeyFigures};
 use hybank::overview::{decibels, frequency, key_figures, six_digits, understood};
@@ -79,7 +79,8 @@ impl BoxArgs {
 pub(super) fn run(args: &Args) -> Result<(), Failure> {
     args.check()?;
     let bank = load(&args.bank)?;
-    let errors = args.errors.widths().error_box(&bank).map_err(|refused| bad_box(&refused))?;
+    let errors = args.errors.widths().error_box(&bank);
+    let errors = errors.map_err(|refused| bad_flag(refused.path(), refused.problem()))?;
     let delay_errors: Vec<Seconds> =
         args.delay_error.iter().map(|error| error.in_seconds(bank.fast_period)).collect();
     let analysis = design::analyze(&bank, &delay_errors).in_file(&args.bank)?;
@@ -168,16 +169,6 @@ impl AnalysisReport {
             },
             self.worst_case.as_ref().map_or_else(String::new, worst_case_text)
         )
-    }
-}
-
-/// A refusal, with the option that it is about.
-fn bad_box(refused: &RefusedBox) -> Failure {
-    let message = format!("--{}: {refused}", refused.field.replace('_', "-"));
-    match refused.rule {
-        BoxRule::Number(_) => Failure::Input(message),
-        BoxRule::NoChannel { channel, .. } => Failure::Usage(format!("--reference {channel}: {refused}")),
-        _ => Failure::Usage(message),
     }
 }
 

@@ -1,8 +1,8 @@
 //! `hybank simulate`: the captures of virtual slow converters.
 
-use super::bank_file::load_spec_or_bank;
+use super::bank_file::{bad_flag, load_spec_or_bank};
 use super::print::{Failure, InFile, show, warn};
-use super::virtual_converters::{CommonReport, ConverterReport, ErrorArgs, bad_error, integers};
+use super::virtual_converters::{CommonReport, ConverterReport, ErrorArgs, integers};
 use super::virtual_signal::{DescribedSignal, SignalArgs};
 use super::written::{Mono, begin_recording, check_together, write_together};
 use hybank::design::Problem;
@@ -11,7 +11,7 @@ use hybank::messages::{Quoted, counted};
 use hybank::overview::understood;
 use hybank::quantity::readable;
 use hybank::simulate::Sampler;
-use hybank::spec::{ChannelSpec, Spec};
+use hybank::spec::{ChannelSpec, Spec, SpecError};
 use hybank::units::Hertz;
 use std::path::PathBuf;
 
@@ -97,14 +97,14 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     // The converters do not know what the spec says of the signal. Without latency the target lies on the
     // time axis of the output of `fuse`.
     let errors = args.errors.errors();
-    let truth = errors.true_spec(&spec).map_err(|refused| bad_error(&refused))?;
+    let bad = |refused: SpecError| bad_flag(refused.path(), refused.problem());
+    let truth = errors.true_spec(&spec).map_err(bad)?;
     let problem = Problem::new(&Spec { signal: None, ..truth }, spec.wait()).in_file(&args.spec)?;
     let signal = DescribedSignal::read(&args.signal, &spec)?;
     let kind = args.kind(signal.is_complex())?;
     let (rates, mut warnings) = Rates::of(&spec, kind).in_file(&args.spec)?;
     warnings.extend(signal.warning(&spec));
-    let converters = errors.converters(&spec, signal.analog.parts());
-    let converters = converters.map_err(|refused| bad_error(&refused))?;
+    let converters = errors.converters(&spec, signal.analog.parts()).map_err(bad)?;
     let frames = signal.frames(&problem, args.samples, errors.is_jittered())?;
     let outputs = args.outputs(kind, signal.is_complex(), &rates);
     args.check_outputs(&outputs)?;

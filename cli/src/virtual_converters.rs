@@ -1,9 +1,8 @@
 //! The errors of virtual converters on the command line.
 
-use super::print::Failure;
 use hybank::io::PcmFormat;
 use hybank::quantity::{self, WrittenTime, readable};
-use hybank::simulate::{ErrorLists, ErrorRule, ErrorsOfConverter, RefusedError};
+use hybank::simulate::{ErrorLists, ErrorsOfConverter};
 use hybank::spec::{ChannelSpec, Spec};
 use hybank::units::Seconds;
 
@@ -93,15 +92,6 @@ pub(super) struct ConverterReport {
     drift: f64,
     /// Samples beyond full scale.
     pub(super) clipped: usize,
-}
-
-/// A refusal, with the option that it is about.
-pub(super) fn bad_error(refused: &RefusedError) -> Failure {
-    let message = format!("--{}: {refused}", refused.field.replace('_', "-"));
-    match refused.rule {
-        ErrorRule::Count(_) | ErrorRule::Bits => Failure::Usage(message),
-        _ => Failure::Input(message),
-    }
 }
 
 impl ConverterReport {

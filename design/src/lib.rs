@@ -10,3 +10,6 @@ pub mod design;
 pub mod figures;
 pub mod lmi;
 pub mod lti;
+
+#[cfg(test)]
+mod tests;

@@ -7,7 +7,7 @@ use crate::results::{FiguresReport, of_report};
 use crate::sources;
 use crate::values::{shares, times};
 use hybank::bank::{self, check_digest};
-use hybank::design::uncertainty::{BoxStudy, BoxWidths, ReferenceChannel, RefusedBox};
+use hybank::design::uncertainty::{BoxStudy, BoxWidths, ReferenceChannel};
 use hybank::design::{self, DesignError};
 use hybank::figures::KeyFigures;
 use hybank::spec::ErrorBox;
@@ -70,10 +70,9 @@ pub(crate) fn analyze<'py>(
         cutoff_box: shares("cutoff_box", cutoff_box)?,
         reference: reference.map(reference_channel).transpose()?,
     };
-    let bad = |refused_box: RefusedBox| refused(format!("{}: {refused_box}", refused_box.field));
     let own = times("delay_error", delay_error)?;
     let own: Vec<Seconds> = own.iter().map(|error| error.in_seconds(given.bank.fast_period)).collect();
-    let errors = widths.error_box(&given.bank).map_err(bad)?;
+    let errors = widths.error_box(&given.bank).map_err(refused)?;
     if errors.is_some() && !own.is_empty() {
         return Err(refused("delay_error: boxes lie around the bank's own delays; leave it out"));
     }

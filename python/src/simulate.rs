@@ -8,9 +8,7 @@ use crate::sources;
 use crate::values::{numbers, shares, times};
 use hybank::captures::ChannelSamples;
 use hybank::design::Problem;
-use hybank::simulate::{
-    Analog, ComplexSource, Delivered, ErrorLists, Periodic, RefusedError, Signal, Source,
-};
+use hybank::simulate::{Analog, ComplexSource, Delivered, ErrorLists, Periodic, Signal, Source};
 use hybank::spec::Spec;
 use hybank::units::{FastPeriods, Hertz};
 use numpy::{Complex64, PyArray1, PyArray2};
@@ -52,14 +50,13 @@ pub(crate) fn simulate<'py>(
         offset: numbers(offset)?,
         seed,
     };
-    let bad = |wrong: RefusedError| refused(format!("{}: {wrong}", wrong.field));
     let spec = sources::spec(source)?;
     // As the command does: the converters do not know what the spec says of the signal. Without latency the
     // target lies on the time axis of the output of `Bank.fuse`.
-    let truth = Spec { signal: None, ..errors.true_spec(&spec).map_err(bad)? };
+    let truth = Spec { signal: None, ..errors.true_spec(&spec).map_err(refused)? };
     let problem = Problem::new(&truth, spec.wait()).map_err(refused)?;
     let signal = analog(&spec, signal, imaginary, rate)?;
-    let converters = errors.converters(&spec, signal.parts()).map_err(bad)?;
+    let converters = errors.converters(&spec, signal.parts()).map_err(refused)?;
     let frames = signal.frames(&problem, samples, errors.is_jittered()).map_err(refused)?;
     let (captured, target) = background::run(py, None, move |_| {
         let each = converters.iter().enumerate();

@@ -51,8 +51,6 @@ mod sample;
 mod simd;
 mod state;
 mod stream;
-#[cfg(test)]
-mod tests;
 
 pub use adapters::{
     FrameSink, FrameSource, Frames, Halves, Interleaved, Nonlinearity, PcmOutput, Planar, SideBySide,
@@ -70,3 +68,6 @@ pub use simd::Isa;
 pub use simd::multiply_add_chains;
 pub use state::STATE_COUNTS;
 pub use stream::Stream;
+
+#[cfg(test)]
+mod tests;

@@ -116,25 +116,16 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The same plan for converters whose samples contain offsets: `offsets[i]` is subtracted from each
-    /// sample of channel i, in the number type of the kernels, before anything else happens to it.
+    /// The same plan for converters whose samples contain offsets and have a static nonlinearity: of a
+    /// sample x of channel i `nonlinearity[i].at(x) + offsets[i]` is subtracted, in the number type of the
+    /// kernels, before anything else happens to it. An empty list of nonlinearities stands for none.
     ///
-    /// The sum is then over x_i - o_i. Samples before the first frame, samples that are not finite, and the
-    /// frames of [`Stream::flush`](crate::Stream::flush) are 0 after the subtraction. If all offsets are 0,
-    /// nothing is subtracted and nothing is slower.
+    /// Samples before the first frame, samples that are not finite, and the frames of
+    /// [`Stream::flush`](crate::Stream::flush) are 0 after the subtraction. If all offsets are 0, nothing is
+    /// subtracted and nothing is slower.
     ///
     /// # Errors
     /// [`BuildError::OffsetCount`] unless there is one for each channel; [`BuildError::NotFinite`].
-    pub fn with_offsets(self, offsets: &[f64]) -> Result<Self, BuildError> {
-        self.with_corrections(offsets, &[])
-    }
-
-    /// As [`Plan::with_offsets`] for converters whose samples also have a static nonlinearity: of a sample x
-    /// of channel i `nonlinearity[i].at(x) + offsets[i]` is subtracted. An empty list of channels stands for
-    /// none.
-    ///
-    /// # Errors
-    /// As [`Plan::with_offsets`].
     pub fn with_corrections(
         self,
         offsets: &[f64],

@@ -8,13 +8,13 @@ use crate::state::{Count, StateHeader, StateNumbers};
 use crate::{Plan, ProcessError, Sample, StateError};
 
 /// Filters the frames of one stream: y[kM + p] = sum_i sum_j f_i[p + jM] x_i[k - j], with x_i = 0 before the
-/// first frame, and x_i the samples without the [offsets](Plan::with_offsets) and nonlinearities of their
-/// converters.
+/// first frame, and x_i the samples without the [offsets](Plan::with_corrections) and nonlinearities of
+/// their converters.
 ///
 /// A frame is one sample of each of the N channels; each gives M output samples, p = 0..M - 1. All calls
 /// take whole frames and return the samples written. They allocate nothing and lock nothing (except those of
 /// a [`ThreadPool`](crate::ThreadPool)), and the same frames give the same bits however they are cut into
-/// calls. [Offsets](Plan::with_offsets) cost a copy of the samples.
+/// calls. [Offsets](Plan::with_corrections) cost a copy of the samples.
 ///
 /// # Worst case of a call
 /// NaN and infinity in the input become 0 and are counted, see [`Stream::replaced`]. Whatever the input

@@ -10,9 +10,6 @@
 //! out of the delays relative to the reference. With the derivative v' freed from its parts along 1 and v,
 //! var(D_i) = s^2 / (g^2 sum v'^2).
 
-#[cfg(test)]
-mod tests;
-
 use super::CalibrationSettings;
 use super::error::CalibrateError;
 use super::estimates::{Fitted, WORST_CONDITION};
@@ -320,3 +317,6 @@ fn correlation_factor(rest: &[f64]) -> f64 {
     let sum: f64 = sizes.take_while(|size| *size > significant).sum();
     (1.0 + 2.0 * sum).sqrt()
 }
+
+#[cfg(test)]
+mod tests;

@@ -45,8 +45,6 @@ mod lines;
 mod measurement;
 mod record;
 mod spectrum;
-#[cfg(test)]
-mod tests;
 mod warning;
 
 pub use compare::{Comparison, ErrorBand, compare};
@@ -171,3 +169,6 @@ pub enum MeasureError {
         lag: i64,
     },
 }
+
+#[cfg(test)]
+mod tests;

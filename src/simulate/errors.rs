@@ -1,11 +1,10 @@
 //! How the virtual converters of a spec differ from what it says, with the limits of that.
 
 use super::{Analog, Quantiser, Sampler};
-use crate::design::uncertainty::{Refused, in_field};
 use crate::quantity::WrittenTime;
 use crate::spec::{
-    ChannelCount, ChannelSpec, Cutoff, Fitting, MAX_LATENCY, Spec, SpecProblem, check_noise, check_offset,
-    for_channels, within,
+    At, ChannelSpec, Cutoff, Fitting, MAX_LATENCY, Spec, SpecError, SpecProblem, check_noise, check_offset,
+    for_channels, refused, within,
 };
 use crate::units::{FastPeriods, Seconds};
 
@@ -77,74 +76,21 @@ pub struct VirtualConverter {
     pub converter: Sampler,
 }
 
-/// A field of [`ErrorLists`] that is refused.
-pub type RefusedError = Refused<ErrorRule>;
-
-/// A rule for the errors of converters.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ErrorRule {
-    /// A number out of its range.
-    #[error(transparent)]
-    Number(Box<SpecProblem>),
-    /// A list of another length.
-    #[error(transparent)]
-    Count(#[from] ChannelCount),
-    /// No quantiser has so many bits.
-    #[error(
-        "a converter has {} to {} bits; leave them out for samples that are not rounded",
-        Quantiser::LEAST_BITS,
-        Quantiser::MOST_BITS
-    )]
-    Bits,
-    /// A jitter so large that its unit is probably wrong.
-    #[error(
-        "{:e} s are {:e} fast periods rms, and the simulation takes 0 to {MOST_JITTER}; check the unit", .rms.0, .jitter.0
-    )]
-    Jitter {
-        /// As asked for.
-        rms: Seconds,
-        /// The same.
-        jitter: FastPeriods,
-    },
-    /// A recording loses digits so far from its samples.
-    #[error(
-        "samples may be {reach:.2} off their instants, more than the {most:.2} for which a recording of this rate keeps \
-         its digits; ask for less jitter, or resample the recording to the fast rate"
-    )]
-    JitterOfRecording {
-        /// The largest deviation.
-        reach: FastPeriods,
-        /// What a recording allows for.
-        most: FastPeriods,
-    },
-    /// `fit` of the spec names a stage that a filter does not have.
-    #[error("`fit` of the spec names {0}, and a filter has no such stage")]
-    NoStage(Fitting),
-}
-
-impl From<SpecProblem> for ErrorRule {
-    fn from(problem: SpecProblem) -> Self {
-        Self::Number(Box::new(problem))
-    }
-}
-
 impl ErrorLists {
     /// The converters of `spec` with these errors, for the parts of a signal.
     ///
     /// # Errors
-    /// [`RefusedError`]: a number out of its range, or a list that has neither one value nor one per
-    /// channel.
+    /// [`SpecError`] with the field: a number out of its range, or a list that has neither one value nor one
+    /// per channel.
     pub fn converters<'a>(
         &self,
         spec: &Spec,
         mut parts: impl Iterator<Item = &'a Analog>,
-    ) -> Result<Vec<VirtualConverter>, RefusedError> {
-        in_field("noise", check_noise(self.noise))?;
-        let quantiser = self.bits.map(|bits| Quantiser::new(bits).ok_or(ErrorRule::Bits));
-        let quantiser = in_field("bits", quantiser.transpose())?;
+    ) -> Result<Vec<VirtualConverter>, SpecError> {
+        check_noise(self.noise).at("noise")?;
+        let quantiser = self.bits.map(|bits| Quantiser::new(bits).ok_or_else(no_quantiser)).transpose()?;
         let jitter = self.jitter.map_or(Seconds(0.0), |jitter| jitter.in_seconds(spec.fast_period));
-        in_field("jitter", parts.try_for_each(|part| check_jitter(jitter, spec.fast_period, part)))?;
+        parts.try_for_each(|part| check_jitter(jitter, spec.fast_period, part))?;
         let channels = spec.channels.len();
         let drift = checked("drift", &self.drift, channels, check_drift)?;
         let most_delay = (spec.fast_period * MAX_LATENCY as f64).0;
@@ -181,8 +127,8 @@ impl ErrorLists {
     /// The spec whose front ends have the true cut-offs: of the stage that `fit` names, if it names one.
     ///
     /// # Errors
-    /// [`RefusedError`] of `cutoff_error`.
-    pub fn true_spec(&self, spec: &Spec) -> Result<Spec, RefusedError> {
+    /// [`SpecError`] of `cutoff_error`.
+    pub fn true_spec(&self, spec: &Spec) -> Result<Spec, SpecError> {
         let part = spec.fit.iter().find_map(|value| match value {
             Fitting::Cutoff(part) => Some(*part),
             _ => None,
@@ -192,8 +138,13 @@ impl ErrorLists {
         let errors = self.cutoffs(spec.channels.len())?;
         for (channel, error) in truth.channels.iter_mut().zip(errors).filter(|(_, error)| *error != 0.0) {
             let scaled = part.scaled(&channel.filter, 1.0 + error);
-            channel.filter =
-                in_field("cutoff_error", scaled.ok_or(ErrorRule::NoStage(Fitting::Cutoff(part))))?;
+            channel.filter = scaled.ok_or_else(|| {
+                let stage = Fitting::Cutoff(part);
+                refused(
+                    "cutoff_error",
+                    format!("`fit` of the spec names {stage}, and a filter has no such stage"),
+                )
+            })?;
         }
         Ok(truth)
     }
@@ -203,21 +154,39 @@ impl ErrorLists {
         self.jitter.is_some_and(|jitter| jitter.in_seconds(Seconds(1.0)).0 > 0.0)
     }
 
-    fn cutoffs(&self, channels: usize) -> Result<Vec<f64>, RefusedError> {
+    fn cutoffs(&self, channels: usize) -> Result<Vec<f64>, SpecError> {
         checked("cutoff_error", &self.cutoff_error, channels, |x| {
             check_share(x, MOST_CUTOFF_ERROR, "a cut-off")
         })
     }
 }
 
-fn check_jitter(rms: Seconds, fast_period: Seconds, signal: &Analog) -> Result<(), ErrorRule> {
+fn no_quantiser() -> SpecError {
+    let (least, most) = (Quantiser::LEAST_BITS, Quantiser::MOST_BITS);
+    let rule =
+        format!("a converter has {least} to {most} bits; leave them out for samples that are not rounded");
+    refused("bits", rule)
+}
+
+fn check_jitter(rms: Seconds, fast_period: Seconds, signal: &Analog) -> Result<(), SpecError> {
     let jitter = rms.in_fast_periods(fast_period);
     if !(0.0..=MOST_JITTER).contains(&jitter.0) {
-        return Err(ErrorRule::Jitter { rms, jitter });
+        let rule = format!(
+            "{:e} s are {:e} fast periods rms, and the simulation takes 0 to {MOST_JITTER}; check the unit",
+            rms.0, jitter.0
+        );
+        return Err(refused("jitter", rule));
     }
     let Analog::Recorded(recording) = signal else { return Ok(()) };
     let (reach, most): (FastPeriods, _) = (jitter * Sampler::MOST_SIGMAS, recording.most_shift());
-    if reach <= most { Ok(()) } else { Err(ErrorRule::JitterOfRecording { reach, most }) }
+    if reach <= most {
+        return Ok(());
+    }
+    let rule = format!(
+        "samples may be {reach:.2} off their instants, more than the {most:.2} for which a recording of this rate \
+         keeps its digits; ask for less jitter, or resample the recording to the fast rate"
+    );
+    Err(refused("jitter", rule))
 }
 
 /// One number for each channel, within its range.
@@ -226,9 +195,9 @@ fn checked(
     given: &[f64],
     channels: usize,
     check: impl Fn(f64) -> Result<(), SpecProblem>,
-) -> Result<Vec<f64>, RefusedError> {
-    in_field(field, given.iter().try_for_each(|&value| check(value)))?;
-    in_field(field, for_channels(given, channels))
+) -> Result<Vec<f64>, SpecError> {
+    given.iter().try_for_each(|&value| check(value)).at(field)?;
+    for_channels(given, channels).at(field)
 }
 
 fn check_drift(ppm: f64) -> Result<(), SpecProblem> {

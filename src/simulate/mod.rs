@@ -23,7 +23,7 @@ mod workload;
 pub use capture::{Analog, interleaved, target};
 pub use complex::ComplexSource;
 pub use converter::{Captured, Delivered, Quantiser, Sampler, capture};
-pub use errors::{ErrorLists, ErrorRule, ErrorsOfConverter, RefusedError, VirtualConverter};
+pub use errors::{ErrorLists, ErrorsOfConverter, VirtualConverter};
 pub use parse::ParseSourceError;
 pub use recording::Periodic;
 pub use response::{Instants, sample};

@@ -42,8 +42,6 @@ mod nonlinearity_table;
 mod normal;
 mod result;
 mod search;
-#[cfg(test)]
-mod tests;
 
 pub use error::SineFitError;
 pub use gauss_newton::{fit, fit_known};
@@ -129,3 +127,6 @@ pub(crate) fn distance_to_edge(cycles: f64) -> f64 {
 pub(crate) fn alias(cycles: f64) -> f64 {
     (cycles - cycles.round()).abs()
 }
+
+#[cfg(test)]
+mod tests;

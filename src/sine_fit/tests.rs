@@ -18,12 +18,8 @@ fn record(count: usize, offset: f64, constant: f64, waves: &[Wave]) -> Vec<f64> 
     (0..count).map(|n| constant + waves.iter().map(|w| at(n, w)).sum::<f64>()).collect()
 }
 
-fn gaussian(random: &mut Random) -> f64 {
-    (-2.0 * (1.0 - random.part()).ln()).sqrt() * (TAU * random.part()).cos()
-}
-
 fn noisy(samples: &[f64], sigma: f64, random: &mut Random) -> Vec<f64> {
-    samples.iter().map(|x| x + sigma * gaussian(random)).collect()
+    samples.iter().map(|x| x + sigma * random.gaussian()).collect()
 }
 
 fn channel(samples: &[f64], offset: f64) -> Channel<'_> {

@@ -4,7 +4,7 @@
 //! and modal coordinates, true to 2e-6. Some of its 174 cases stand here; the whole table is read from the
 //! file `causal-optima.json` of the data where `HYBANK_SLOW` is set.
 
-use crate::support::specs::alike;
+use crate::support::{self, specs::alike};
 use hybank::design::{DesignOptions, design};
 use hybank::spec::{Family, FilterSpec, Passband, Spec};
 use hybank::units::Hertz;
@@ -108,8 +108,8 @@ fn every_causal_optimum_is_reached() {
     for Case { name, mut spec, optimum, .. } in cases {
         spec.design.method = hybank::spec::Method::Iir;
         let begin = std::time::Instant::now();
-        let excess = match design(&spec, &DesignOptions::without_proof()) {
-            Ok(design) => design.bank.gamma.norm.unwrap() / optimum - 1.0,
+        let excess = match support::design(&spec) {
+            Ok(bank) => bank.gamma.norm.unwrap() / optimum - 1.0,
             Err(error) => {
                 println!("{error}");
                 f64::INFINITY

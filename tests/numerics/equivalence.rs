@@ -5,52 +5,28 @@
 //! Fewer inputs and fewer outputs can only lower the largest gain, so it must approach the computed norm
 //! from below.
 
-use hybank::analog::StrictlyProper;
+use crate::support::specs::{alike, tf, thesis_filter};
 use hybank::bank::SynthesisFilters;
 use hybank::design::LiftedPlant;
 use hybank::design::filters::lifted;
-use hybank::design::problem::{Channel, Problem};
+use hybank::design::problem::Problem;
 use hybank::linalg::{Mat, singular_values};
 use hybank::simulate::{Instants, Source, sample};
 use hybank::spec::{Family, FilterSpec, Passband};
-use hybank::units::{FastPeriods, GridTime, Hertz, Seconds};
+use hybank::units::{FastPeriods, Hertz};
 
 struct Case {
     problem: Problem,
     taps: Vec<Vec<f64>>,
 }
 
-fn filter(spec: &FilterSpec) -> StrictlyProper {
-    StrictlyProper::new(spec, Seconds(1.0)).unwrap()
-}
-
-fn tf(num: &[f64], den: &[f64]) -> FilterSpec {
-    FilterSpec::TransferFunction { num: num.to_vec(), den: den.to_vec() }
-}
-
 fn case(ratio: usize, latency: usize, front_ends: &[FilterSpec], channels: &[(usize, f64)]) -> Case {
-    let problem = Problem {
-        fast_period: Seconds(1.0),
-        ratio,
-        latency,
-        wait: 0,
-        signal: None,
-        band: None,
-        front_ends: front_ends.iter().map(filter).collect(),
-        target: 0,
-        channels: channels
-            .iter()
-            .enumerate()
-            .map(|(converter, &(front_end, delay))| Channel {
-                converter,
-                front_end,
-                gain: 1.0,
-                converter_gain: 1.0,
-                delay: GridTime::new(Seconds(delay), Seconds(1.0)),
-            })
-            .collect(),
-        noise: vec![0.0; channels.len()],
-    };
+    let delays: Vec<f64> = channels.iter().map(|(_, delay)| *delay).collect();
+    let mut spec = alike(&front_ends[0], ratio, latency, &delays);
+    for (channel, (front_end, _)) in spec.channels.iter_mut().zip(channels) {
+        channel.filter = front_ends[*front_end].clone();
+    }
+    let problem = Problem::new(&spec, latency).unwrap();
     // Any taps will do: the equivalence does not care whether they are good.
     let taps = (0..channels.len())
         .map(|i| (0..3 * ratio + 1).map(|n| ((1 + i * 5 + n * 3) as f64).sin() * 0.6).collect())
@@ -114,29 +90,28 @@ fn check(name: &str, case: &Case) {
     assert!(fine > 0.985 * norm, "{name}: {fine} stays away from {norm}");
 }
 
-fn thesis() -> FilterSpec {
-    tf(&[0.25], &[1.0, 1.0, 0.25])
-}
-
 #[test]
 fn as_many_channels_as_the_ratio() {
-    check("N = M", &case(2, 3, &[thesis()], &[(0, 1.2), (0, 0.6)]));
+    check("N = M", &case(2, 3, &[thesis_filter()], &[(0, 1.2), (0, 0.6)]));
 }
 
 #[test]
 fn oversampled_with_different_filters_and_equal_delays() {
-    let filters = [thesis(), tf(&[1.0], &[1.0, 1.0]), tf(&[0.36], &[1.0, 0.84, 0.36])];
+    let filters = [thesis_filter(), tf(&[1.0], &[1.0, 1.0]), tf(&[0.36], &[1.0, 0.84, 0.36])];
     check("N > M", &case(2, 0, &filters, &[(1, 0.2), (2, 0.2), (0, 1.6)]));
 }
 
 #[test]
 fn undersampled() {
-    check("N < M", &case(3, 2, &[thesis()], &[(0, 0.0), (0, 1.9)]));
+    check("N < M", &case(3, 2, &[thesis_filter()], &[(0, 0.0), (0, 1.9)]));
 }
 
 #[test]
 fn delays_of_many_periods_and_whole_ones() {
-    check("long delays", &case(2, 1, &[thesis(), tf(&[2.0], &[1.0, 2.0])], &[(0, 5.3), (1, 2.0), (0, 0.0)]));
+    check(
+        "long delays",
+        &case(2, 1, &[thesis_filter(), tf(&[2.0], &[1.0, 2.0])], &[(0, 5.3), (1, 2.0), (0, 0.0)]),
+    );
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! The ready specs and banks in `filters/`: each spec designs, each bank keeps its promise.
 
+use crate::support::designed;
 use hybank::bank::{Bank, Gamma};
-use hybank::design::{self, DesignOptions, GammaScale, analyze, analyze_mean, design, prove};
+use hybank::design::{self, GammaScale, analyze, analyze_mean, prove};
 use hybank::figures::Figures;
 use hybank::overview;
 use hybank::spec::Spec;
@@ -66,7 +67,7 @@ fn nothing_is_warned_of() {
 fn a_fresh_design_agrees() {
     for (name, spec, bank) in pairs() {
         // `verify` proves the bounds of the files. The search for a proof of one of them takes 15 s.
-        let designed = design(&spec, &DesignOptions::without_proof()).unwrap().bank.gamma;
+        let designed = designed(&spec).gamma;
         let values = [(designed.norm, bank.gamma.norm), (designed.noncausal, bank.gamma.noncausal)];
         let (norm, lower) = (bank.gamma.norm.unwrap(), designed.lower.unwrap());
         assert!(designed.upper.unwrap() >= norm, "{name}: {designed:?}");

@@ -1,6 +1,7 @@
 //! The unit of a signal does not matter: K = W - F H is linear in the target's gain, and a channel's gain is
 //! undone by its filter. Designed, proven and read back over 18 decades.
 
+use crate::support::proven;
 use crate::support::specs::{alike, amplified, amplify, butterworth, tf, thesis, with_taps};
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::{DesignOptions, analyze, design};
@@ -37,41 +38,20 @@ fn check(what: &str, spec: &Spec, wanted: f64) -> Bank {
     bank
 }
 
+/// A gain of all front ends or of the target is one of gamma; one of a channel is undone by its filter, and
+/// so is that of a converter, which is a gain of the filter in front of it.
 #[test]
-fn a_gain_of_all_front_ends_is_one_of_gamma() {
+fn gains_are_those_of_gamma_or_undone_by_the_filters() {
     for method in [Method::Fir, Method::Iir, Method::H2] {
         for gain in GAINS {
             check(&format!("{method:?}, all {gain:e}"), &amplified(example(method), gain), GAMMA * gain);
-        }
-    }
-}
-
-#[test]
-fn a_gain_of_the_target_is_one_of_gamma() {
-    for method in [Method::Fir, Method::Iir, Method::H2] {
-        for gain in GAINS {
             let mut spec = example(method);
             amplify(&mut spec.target, gain);
             check(&format!("{method:?}, target {gain:e}"), &spec, GAMMA * gain);
-        }
-    }
-}
-
-#[test]
-fn a_gain_of_a_channel_is_undone_by_its_filter() {
-    for method in [Method::Fir, Method::Iir, Method::H2] {
-        for gain in GAINS {
             let mut spec = example(method);
             amplify(&mut spec.channels[0].filter, gain);
             check(&format!("{method:?}, channel 1 {gain:e}"), &spec, GAMMA);
         }
-    }
-}
-
-/// A converter's gain is a gain of the filter in front of it, which knows nothing of it.
-#[test]
-fn a_gain_of_a_converter_is_undone_by_its_filter() {
-    for method in [Method::Fir, Method::Iir, Method::H2] {
         for gain in [1e-6, 0.97, -1.0, 1.03, 1e6] {
             let mut spec = example(method);
             spec.channels[0].gain = gain;
@@ -84,9 +64,9 @@ fn a_gain_of_a_converter_is_undone_by_its_filter() {
 fn the_methods_for_comparison_know_the_gains_of_converters() {
     for method in [Method::Sinc, Method::Separation] {
         let mut spec = Spec { design: DesignSpec::new(method, Some(22)), ..example(Method::Fir) };
-        let plain = design(&spec, &DesignOptions::default()).unwrap().bank;
+        let plain = proven(&spec).bank;
         (spec.channels[0].gain, spec.channels[1].gain) = (0.5, -2.0);
-        let bank = design(&spec, &DesignOptions::default()).unwrap().bank;
+        let bank = proven(&spec).bank;
         let [plain_gamma, gamma] = [&plain, &bank].map(|bank| bank.gamma.norm.unwrap());
         assert!((gamma / plain_gamma - 1.0).abs() < 1e-6, "{method:?}: {gamma} {plain_gamma}");
         assert_eq!(bank.gains, [0.5, -2.0]);
@@ -138,7 +118,7 @@ fn steep_front_ends_of_much_gain_are_designed() {
         let unity = FilterSpec::Cascade { cascade: vec![butterworth(4, 1.2), tf(&[1.0], &[0.1, 1.0])] };
         let gamma = |filter| {
             let spec = alike(filter, 4, 12, &[0.0, 1.3, 2.1, 2.95]);
-            design(&spec, &DesignOptions::default()).unwrap().bank.gamma.norm.unwrap()
+            proven(&spec).bank.gamma.norm.unwrap()
         };
         let (amplified, plain) = (gamma(&filter), gamma(&unity));
         assert!((amplified / (gain * plain) - 1.0).abs() < 1e-6, "{amplified:e} {plain}");
@@ -158,7 +138,7 @@ fn gains_twelve_decades_apart_change_no_gamma() {
         let mut unequal = spec.clone();
         let gains = [1e-6, 1.0, 1e6];
         unequal.channels.iter_mut().zip(gains).for_each(|(channel, gain)| channel.gain = gain);
-        let [plain, unequal] = [spec, unequal].map(|spec| design(&spec, &DesignOptions::default()).unwrap());
+        let [plain, unequal] = [spec, unequal].map(|spec| proven(&spec));
         let [before, after] = [&plain, &unequal].map(|found| found.bank.gamma.norm.unwrap());
         assert!((after / before - 1.0).abs() < 1e-9, "{method:?}: {before} {after}");
         let noncausal = |found: &hybank::design::Design| found.bank.gamma.noncausal.unwrap();

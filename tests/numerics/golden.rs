@@ -5,17 +5,13 @@
 //! good to 1e-6 relative unless more digits stand here.
 
 use crate::support::specs::{alike, butterworth, tf, thesis, thesis_filter, with_taps};
+use crate::support::{design, designed};
 use hybank::design::filters::lifted;
-use hybank::design::{Design, DesignError, DesignOptions, LiftedPlant, Problem, analyze};
+use hybank::design::{LiftedPlant, Problem, analyze};
 use hybank::lti::FrequencyResponse;
 use hybank::spec::{DesignSpec, Method, Spec};
 use hybank::units::Seconds;
 use std::f64::consts::PI;
-
-/// Designs without a search for proofs, which other tests are about.
-fn design(spec: &Spec) -> Result<Design, DesignError> {
-    hybank::design::design(spec, &DesignOptions::without_proof())
-}
 
 pub(crate) fn g8() -> Spec {
     alike(&tf(&[2.0], &[1.0, 2.0]), 2, 4, &[0.3, 1.7])
@@ -42,7 +38,7 @@ pub(crate) fn g12() -> Spec {
 
 /// Designs and compares; the reported interval must close and hold the golden number.
 fn check(id: &str, spec: &Spec, golden: f64, relative: f64) {
-    let gamma = design(spec).unwrap_or_else(|error| panic!("{id}: {error}")).bank.gamma;
+    let gamma = design(spec).unwrap_or_else(|error| panic!("{id}: {error}")).gamma;
     let (norm, lower) = (gamma.norm.unwrap(), gamma.lower.unwrap());
     assert!((norm / golden - 1.0).abs() <= relative, "{id}: {gamma:?}, golden {golden}");
     assert!(lower <= norm && lower >= golden * (1.0 - 2.0 * relative), "{id}: {gamma:?}, golden {golden}");
@@ -72,7 +68,7 @@ fn g4_the_optimum_settles_with_the_latency() {
     }
     // Here the optimum lies above the non-causal bound: it is hit, but its proof is looser.
     for (latency, golden) in [(0, 0.187045), (1, 0.0694470)] {
-        let gamma = design(&thesis(latency, &[1.2, 0.6])).unwrap().bank.gamma;
+        let gamma = designed(&thesis(latency, &[1.2, 0.6])).gamma;
         assert!(
             (gamma.norm.unwrap() / golden - 1.0).abs() < printed(golden),
             "G4b, m0 = {latency}: {gamma:?}"
@@ -84,7 +80,7 @@ fn g4_the_optimum_settles_with_the_latency() {
 #[test]
 fn g5_wanted_samples_are_passed_on() {
     for spec in [thesis(10, &[0.0, 1.0]), with_taps(thesis(10, &[0.0, 1.0]), 22)] {
-        let gamma = design(&spec).unwrap().bank.gamma;
+        let gamma = designed(&spec).gamma;
         assert!(gamma.norm.unwrap() < 1e-12, "{gamma:?}");
     }
 }
@@ -101,7 +97,7 @@ pub(crate) fn g6(h: f64, method: Method) -> Spec {
 #[test]
 fn g6_the_unit_of_time_does_not_matter() {
     for (h, method) in [(1e-6, Method::Iir), (1e-9, Method::Iir), (1e-6, Method::Fir), (1e3, Method::H2)] {
-        let designed = |h: f64| design(&g6(h, method)).unwrap().bank;
+        let designed = |h: f64| designed(&g6(h, method));
         let (scaled, unscaled) = (designed(h), designed(1.0));
         let (a, b) = (scaled.gamma.norm.unwrap(), unscaled.gamma.norm.unwrap());
         assert!((a / b - 1.0).abs() < 1e-9, "G6 at h = {h}: {a} {b}");
@@ -163,7 +159,7 @@ fn g12c_with_1024_unknowns() {
 /// Depends on which of the many optimal banks was found: a guide to within a few percent.
 #[test]
 fn g13_jitter_of_the_optimal_bank() {
-    let bank = design(&with_taps(thesis(10, &[1.2, 0.6]), 22)).unwrap().bank;
+    let bank = designed(&with_taps(thesis(10, &[1.2, 0.6]), 22));
     for (errors, golden) in
         [([0.1, 0.0], 0.0389583), ([0.0, 0.1], 0.0439780), ([0.1, 0.1], 0.0433790), ([0.1, -0.1], 0.0392280)]
     {
@@ -175,7 +171,7 @@ fn g13_jitter_of_the_optimal_bank() {
 #[test]
 fn g14_singular_values_of_the_error_system() {
     let spec = with_taps(thesis(10, &[1.2, 0.6]), 22);
-    let bank = design(&spec).unwrap().bank;
+    let bank = designed(&spec);
     let plant = LiftedPlant::new(&Problem::new(&spec, 10).unwrap());
     let filters = lifted(&bank.filters, 2);
     let error = FrequencyResponse::new(&plant.error_system(&filters));
@@ -192,7 +188,7 @@ fn g15_errors_on_the_thesis_inputs() {
     use hybank::runtime::{Options, Precision, Stream};
     use hybank::simulate::{Analog, Source, capture};
     let spec = with_taps(thesis(10, &[1.2, 0.6]), 22);
-    let bank = design(&spec).unwrap().bank;
+    let bank = designed(&spec);
     let problem = Problem::new(&spec, 10).unwrap();
     for (source, golden) in [("step@0.3", 0.000822), ("tones:0.3,0.8", 0.00177)] {
         let source: Source = source.parse().unwrap();
@@ -217,13 +213,13 @@ fn noise_of_the_converters_is_weighed_within_the_gamma_margin() {
         let mut spec = with_taps(thesis(10, &[1.2, 0.6]), 22);
         spec.channels.iter_mut().zip(sigma).for_each(|(channel, sigma)| channel.noise = sigma);
         spec.design.gamma_margin = gamma_margin;
-        let bank = design(&spec).unwrap().bank;
+        let bank = designed(&spec);
         let judged = |bank: &hybank::bank::Bank| {
             let mean = analyze(bank, &[]).unwrap().mean;
             mean.rms_error.powi(2) + mean.output_noise.powi(2)
         };
         let mut quiet = bank.clone();
-        quiet.filters = design(&with_taps(thesis(10, &[1.2, 0.6]), 22)).unwrap().bank.filters;
+        quiet.filters = designed(&with_taps(thesis(10, &[1.2, 0.6]), 22)).filters;
         (bank.gamma.norm.unwrap(), judged(&bank), judged(&quiet))
     };
     let optimum = 0.03993204;

@@ -3,7 +3,8 @@
 //! is within 0.1 dB of the best.
 
 use crate::support::specs::{alike, butterworth};
-use hybank::design::{DesignError, DesignOptions, Sizing, analyze_mean, design};
+use crate::support::{design, designed};
+use hybank::design::{DesignError, Sizing, analyze_mean};
 use hybank::spec::{DesignSpec, Method, Spec};
 use std::f64::consts::TAU;
 
@@ -29,9 +30,9 @@ fn error(spec: &Spec, latency: usize) -> f64 {
         spec.design =
             DesignSpec { order: spec.design.order, ..DesignSpec::new(Method::H2, spec.design.taps) };
     }
-    match design(&spec, &DesignOptions::without_proof()) {
+    match design(&spec) {
         Ok(found) => {
-            let mean = analyze_mean(&found.bank).unwrap();
+            let mean = analyze_mean(&found).unwrap();
             mean.rms_error.hypot(mean.output_noise)
         }
         Err(DesignError::OutOfReach { .. } | DesignError::RiccatiFailed { .. }) => f64::INFINITY,
@@ -104,15 +105,12 @@ fn interleaved_converters_need_three_samples_of_latency() {
 }
 
 fn gamma(spec: &Spec, latency: usize) -> f64 {
-    let spec = Spec { latency: Some(latency), ..spec.clone() };
-    design(&spec, &DesignOptions::without_proof()).unwrap().bank.gamma.norm.unwrap()
+    designed(&Spec { latency: Some(latency), ..spec.clone() }).gamma.norm.unwrap()
 }
 
 fn refusal(spec: &Spec, latency: usize) -> DesignError {
     let spec = Spec { latency: Some(latency), ..spec.clone() };
-    design(&spec, &DesignOptions::without_proof())
-        .err()
-        .unwrap_or_else(|| panic!("latency {latency} is reached"))
+    design(&spec).err().unwrap_or_else(|| panic!("latency {latency} is reached"))
 }
 
 /// With 32 taps the samples of latency 1000 are too old for any tap, and so are those before a long delay.
@@ -147,9 +145,7 @@ fn a_common_delay_adds_to_the_latency() {
         Spec { latency: None, design: DesignSpec::new(method, method.has_taps().then_some(14)), ..spec }
     };
     for method in [Method::Fir, Method::Iir, Method::H2, Method::Sinc, Method::Separation] {
-        let designed =
-            |common: f64| design(&with_delay(method, common), &DesignOptions::without_proof()).unwrap().bank;
-        let (near, far) = (designed(0.0), designed(20_001.0));
+        let [near, far] = [0.0, 20_001.0].map(|common| designed(&with_delay(method, common)));
         assert_eq!(far.latency, near.latency + 20_001, "{method:?}");
         let [near, far] = [near, far].map(|bank| bank.gamma.norm.unwrap());
         assert!((far / near - 1.0).abs() < 1e-6, "{method:?}: {near} {far}");

@@ -1,7 +1,8 @@
 //! Delays next to whole fast periods and next to one another, against closed forms.
 
 use crate::support::specs::{alike, low_pass, with_taps};
-use hybank::design::{DesignOptions, ProofSearch, design, judge_taps};
+use crate::support::{designed, proven};
+use hybank::design::{ProofSearch, judge_taps};
 use hybank::spec::{Family, FilterSpec, Passband, Spec};
 use hybank::units::Hertz;
 use std::f64::consts::PI;
@@ -23,7 +24,7 @@ fn a_delay_next_to_a_whole_one_is_not_taken_for_it() {
              [[channel]]\ndelay = {delay:?}\n[design]\nmethod = \"fir\"\ntaps = 1\n"
         );
         let spec = Spec::from_toml(&text, "spec.toml").unwrap();
-        let gamma = design(&spec, &DesignOptions::default()).unwrap().bank.gamma;
+        let gamma = proven(&spec).bank.gamma;
         let late = delay - f64::from(latency);
         // A later sample can be used as it is; nothing older than the target's can.
         let expected = (-0.5 * pole * f64::exp_m1(-2.0 * pole * late.abs())).sqrt();
@@ -79,7 +80,7 @@ fn the_norm_lies_in_the_proven_interval() {
     let filter = low_pass(Family::Butterworth, 2, 0.2 * PI);
     for ratio in [1, 2] {
         let spec = with_taps(alike(&filter, ratio, 6, &[1.2, 1.20000000012]), 12);
-        let designed = design(&spec, &DesignOptions::default()).unwrap();
+        let designed = proven(&spec);
         let (norm, proven) = (designed.bank.gamma.norm.unwrap(), designed.proof.unwrap());
         let inside = proven.attained * (1.0 - 1e-9) <= norm && norm <= proven.upper;
         assert!(inside, "{ratio}: {norm:e} {proven:?}");
@@ -92,7 +93,7 @@ fn the_norm_lies_in_the_proven_interval() {
 fn delays_a_millionth_apart_are_resolved() {
     for apart in [1e-3, 1e-6] {
         let spec = with_taps(alike(&low_pass(Family::Butterworth, 2, 0.5), 2, 4, &[0.6, 0.6 + apart]), 8);
-        let found = design(&spec, &DesignOptions::without_proof()).unwrap().bank.gamma;
+        let found = designed(&spec).gamma;
         let (lower, norm) = (found.lower.unwrap(), found.norm.unwrap());
         assert!(lower <= norm && lower > 0.99 * norm, "{apart:e}: {found:?}");
     }

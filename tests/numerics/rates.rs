@@ -2,9 +2,10 @@
 //! and errors that the samples of a converter share against brute force.
 
 use crate::support::random::Random;
+use crate::support::{designed, proven};
 use hybank::bank::{Bank, SynthesisFilters};
 use hybank::design::uncertainty::BoxStudy;
-use hybank::design::{Design, DesignOptions, analyze_mean, design, norm_at};
+use hybank::design::{analyze_mean, norm_at};
 use hybank::spec::{ErrorBox, ErrorPoint, Spec};
 use hybank::units::{FastPeriods, Seconds};
 use hybank::verify::verify;
@@ -21,10 +22,6 @@ fn spec(design: &str) -> Spec {
     Spec::from_toml(&text, "spec.toml").unwrap()
 }
 
-fn designed(spec: &Spec, options: &DesignOptions<'_>) -> Design {
-    design(spec, options).unwrap()
-}
-
 /// gamma, its proof, and the mean error of each method are those of five channels of one rate.
 #[test]
 fn a_bank_for_unequal_rates_is_one_for_all_samples_of_a_frame() {
@@ -37,22 +34,17 @@ fn a_bank_for_unequal_rates_is_one_for_all_samples_of_a_frame() {
         assert_eq!((own.ratio, own.layout().samples().to_vec(), own.wait()), (6, vec![3, 2], 4));
         let by_hand = own.per_sample();
         assert_eq!((by_hand.channels.len(), by_hand.wait()), (5, 0));
-        let found = designed(&own, &DesignOptions::default());
-        let hand = designed(&by_hand, &DesignOptions::without_proof());
-        let gamma = |design: &Design| design.bank.gamma.norm.unwrap();
-        assert!(
-            (gamma(&found) / gamma(&hand) - 1.0).abs() < 1e-6,
-            "{table}: {} {}",
-            gamma(&found),
-            gamma(&hand)
-        );
-        let mean = |design: &Design| analyze_mean(&design.bank).unwrap().rms_error;
-        assert!((mean(&found) / mean(&hand) - 1.0).abs() < 1e-3, "{table}");
+        let found = proven(&own);
+        let hand = designed(&by_hand);
+        let [gamma, other] = [&found.bank, &hand].map(|bank| bank.gamma.norm.unwrap());
+        assert!((gamma / other - 1.0).abs() < 1e-6, "{table}: {gamma} {other}");
+        let mean = |bank: &Bank| analyze_mean(bank).unwrap().rms_error;
+        assert!((mean(&found.bank) / mean(&hand) - 1.0).abs() < 1e-3, "{table}");
         found.proof.as_ref().unwrap_or_else(|error| panic!("{table}: {error}"));
         let read = Bank::from_json(&found.bank.to_json().unwrap(), "bank.json").unwrap();
         assert_eq!(read, found.bank, "{table}");
         let proven = verify(&read).unwrap();
-        assert!(proven.upper >= gamma(&found) && proven.upper < gamma(&found) * 1.001, "{table}: {proven:?}");
+        assert!(proven.upper >= gamma && proven.upper < gamma * 1.001, "{table}: {proven:?}");
     }
 }
 
@@ -70,7 +62,7 @@ fn equal_rates_are_no_rates() {
     let plain = read("", "ratio = 2");
     assert_eq!(read(", rate = \"24 kHz\"", ""), plain);
     assert_eq!(read(", rate = \"24 kHz\"", "ratio = 2"), plain);
-    let json = designed(&plain, &DesignOptions::without_proof()).bank.to_json().unwrap();
+    let json = designed(&plain).to_json().unwrap();
     assert!(!json.contains("rate\"") && !json.contains("samples"), "{json}");
 }
 
@@ -79,7 +71,7 @@ fn equal_rates_are_no_rates() {
 #[test]
 fn the_samples_of_a_converter_share_its_errors() {
     let own = spec("design = { method = \"fir\", taps = 12 }");
-    let bank = designed(&own, &DesignOptions::without_proof()).bank;
+    let bank = designed(&own);
     let errors = ErrorBox {
         delays: vec![FastPeriods(0.0), FastPeriods(0.1)],
         gains: vec![0.02, 0.0],
@@ -129,14 +121,10 @@ fn the_samples_of_a_converter_share_its_errors() {
 #[test]
 fn robust_designs_know_one_error_per_converter() {
     let box_of = "uncertainty = { delay = [0, 0.1], reference = 1 }\n";
-    let nominal =
-        designed(&spec("design = { method = \"fir\", taps = 12 }"), &DesignOptions::without_proof()).bank;
+    let nominal = designed(&spec("design = { method = \"fir\", taps = 12 }"));
     let errors = ErrorBox { delays: vec![FastPeriods(0.0), FastPeriods(0.1)], ..ErrorBox::none(2) };
     let careless = BoxStudy::new(&nominal, &errors).unwrap();
-    let robust = designed(
-        &spec(&format!("{box_of}design = {{ method = \"fir\", taps = 12 }}")),
-        &DesignOptions::default(),
-    );
+    let robust = proven(&spec(&format!("{box_of}design = {{ method = \"fir\", taps = 12 }}")));
     let stated = robust.bank.gamma.worst_case.unwrap_or_else(|| panic!("{:?}", robust.box_unproven));
     assert!(stated < careless.upper, "{stated} {careless:?}");
     let found = BoxStudy::new(&robust.bank, &errors).unwrap();
@@ -155,12 +143,8 @@ fn mean_square_banks_average_over_one_error_per_converter() {
         spec.channels.iter_mut().for_each(|channel| channel.noise = 1e-3);
         spec
     };
-    let averaged = designed(
-        &table(&format!("uncertainty = {{ delay = [0, {half}], reference = 1 }}\n")),
-        &DesignOptions::without_proof(),
-    )
-    .bank;
-    let nominal = designed(&table(""), &DesignOptions::without_proof()).bank;
+    let averaged = designed(&table(&format!("uncertainty = {{ delay = [0, {half}], reference = 1 }}\n")));
+    let nominal = designed(&table(""));
     // Nodes and weights for the weight exp(-x^2).
     let nodes = [
         (0.0, 0.8102646175568073),

@@ -1,8 +1,9 @@
 //! Order reduction as a user meets it: banks of few states, proven, beside FIR banks of the same cost.
 
 use crate::support::specs::{alike, amplified, butterworth, thesis};
-use hybank::bank::{Bank, StateMatrices, SynthesisFilters};
-use hybank::design::{Design, DesignOptions, OrderReduction, Study, analyze, design};
+use crate::support::{block, designed, proven};
+use hybank::bank::{Bank, StateMatrices};
+use hybank::design::{Design, OrderReduction, Study, analyze};
 use hybank::spec::{DesignSpec, FilterSpec, Method, Reduction, Spec};
 use hybank::verify::verify;
 use std::f64::consts::TAU;
@@ -13,14 +14,7 @@ fn reduced(mut spec: Spec, method: Method, reduction: Reduction) -> Design {
         Reduction::Order(order) => spec.design.order = Some(order),
         Reduction::Loss(db) => spec.design.reduction_loss_db = Some(db),
     }
-    design(&spec, &DesignOptions::default()).unwrap()
-}
-
-fn block(bank: &Bank) -> &StateMatrices {
-    match &bank.filters {
-        SynthesisFilters::StateSpace(block) => block,
-        SynthesisFilters::Fir(_) => panic!("taps"),
-    }
+    proven(&spec)
 }
 
 /// Numbers of the matrices that are not zero: multiply-adds per frame.
@@ -86,7 +80,7 @@ fn a_loss_allowed_is_kept() {
 #[test]
 fn with_all_its_states_it_is_the_full_bank() {
     let spec = thesis(6, &[1.2, 0.6]);
-    let full = design(&spec, &DesignOptions::default()).unwrap();
+    let full = proven(&spec);
     assert!(record(&full).is_none());
     for order in [block(&full.bank).a.len(), 1000] {
         let same = reduced(spec.clone(), Method::Iir, Reduction::Order(order));
@@ -104,7 +98,7 @@ fn it_is_worth_its_cost_beside_taps() {
     let macs = cost(block(&found.bank));
     let mut taps = spec;
     taps.design = DesignSpec::new(Method::Fir, Some(macs.div_ceil(2)));
-    let fir = design(&taps, &DesignOptions::default()).unwrap().bank.gamma.norm.unwrap();
+    let fir = proven(&taps).bank.gamma.norm.unwrap();
     let iir = found.bank.gamma.norm.unwrap();
     println!("{macs} multiply-adds per frame: recursive {iir}, taps {fir}");
     assert!(iir < 0.1 * fir, "{iir} {fir}");
@@ -132,7 +126,7 @@ fn without_states_channels_whole_periods_apart_are_as_good_as_taps() {
         for method in [Method::Fir, Method::H2] {
             let mut taps = spec.clone();
             taps.design = DesignSpec::new(method, Some(ratio));
-            let taps = design(&taps, &DesignOptions::without_proof()).unwrap().bank.gamma.norm.unwrap();
+            let taps = designed(&taps).gamma.norm.unwrap();
             let recursive = if method == Method::H2 { Method::H2 } else { Method::Iir };
             let stateless = check(&reduced(spec.clone(), recursive, Reduction::Order(0)), 0);
             let gamma = stateless.gamma.norm.unwrap();

@@ -1,17 +1,12 @@
 //! Channels that repeat what others measure: the same filter, up to a gain, sampled whole slow periods
 //! later. `HYBANK_TRIALS=200` tries so many random plants.
 
+use crate::support::proven;
 use crate::support::random::Random;
-use crate::support::specs::{alike, amplify, low_pass, thesis};
-use hybank::design::{Design, DesignOptions, analyze, design};
-use hybank::spec::{Family, FilterSpec, Method, Spec};
+use crate::support::specs::{alike, amplify, low_pass_at, thesis};
+use hybank::design::{Design, analyze};
+use hybank::spec::{Family, Method, Spec};
 use hybank::verify::verify;
-use std::f64::consts::TAU;
-
-/// A low-pass with its cutoff in cycles per fast sample.
-fn filter(family: Family, order: usize, cutoff: f64) -> FilterSpec {
-    low_pass(family, order, TAU * cutoff)
-}
 
 fn by(method: Method, mut spec: Spec) -> Spec {
     spec.design.method = method;
@@ -25,39 +20,36 @@ fn norm(design: &Design) -> f64 {
 /// Two channels that carry the whole information, and two that repeat it a period later.
 #[test]
 fn a_channel_a_period_later_adds_nothing_and_harms_nothing() {
-    let front_end = filter(Family::Butterworth, 4, 0.2);
+    let front_end = low_pass_at(Family::Butterworth, 4, 0.2);
     for method in [Method::Iir, Method::H2] {
-        let four =
-            design(&by(method, alike(&front_end, 2, 8, &[0.2, 1.1, 2.2, 3.1])), &DesignOptions::default())
-                .unwrap();
-        let two =
-            design(&by(method, alike(&front_end, 2, 8, &[0.2, 1.1])), &DesignOptions::default()).unwrap();
+        let four = proven(&by(method, alike(&front_end, 2, 8, &[0.2, 1.1, 2.2, 3.1])));
+        let two = proven(&by(method, alike(&front_end, 2, 8, &[0.2, 1.1])));
         assert!((norm(&four) / norm(&two) - 1.0).abs() < 1e-6, "{} {}", norm(&four), norm(&two));
         let noise_gain = analyze(&four.bank, &[]).unwrap().mean.noise_gain;
         assert!(noise_gain < 10.0, "{noise_gain}");
-        let proven = four.proof.as_ref().unwrap();
-        assert_eq!(&verify(&four.bank).unwrap(), proven);
+        let proof = four.proof.as_ref().unwrap();
+        assert_eq!(&verify(&four.bank).unwrap(), proof);
         // The optimum, of 64 taps too.
         assert!((four.bank.gamma.noncausal.unwrap() / 0.01743 - 1.0).abs() < 1e-3, "{:?}", four.bank.gamma);
         if method == Method::Iir {
-            assert!(proven.upper / 0.01743 < 1.0 + 1e-3, "{proven:?}");
+            assert!(proof.upper / 0.01743 < 1.0 + 1e-3, "{proof:?}");
         }
     }
 }
 
 #[test]
 fn one_converter_twice_is_one_converter() {
-    let front_end = filter(Family::Butterworth, 4, 0.2);
-    let two = design(&alike(&front_end, 2, 1, &[0.2, 2.2]), &DesignOptions::default()).unwrap();
-    let one = design(&alike(&front_end, 2, 1, &[0.2]), &DesignOptions::default()).unwrap();
+    let front_end = low_pass_at(Family::Butterworth, 4, 0.2);
+    let two = proven(&alike(&front_end, 2, 1, &[0.2, 2.2]));
+    let one = proven(&alike(&front_end, 2, 1, &[0.2]));
     assert!((norm(&two) / norm(&one) - 1.0).abs() < 1e-6, "{} {}", norm(&two), norm(&one));
 }
 
 #[test]
 fn four_interleaved_converters_at_half_the_ratio_are_designed() {
-    let front_end = filter(Family::Butterworth, 4, 0.2);
-    let four = design(&alike(&front_end, 2, 8, &[0.0, 1.0, 2.0, 3.0]), &DesignOptions::default()).unwrap();
-    let two = design(&alike(&front_end, 2, 8, &[0.0, 1.0]), &DesignOptions::default()).unwrap();
+    let front_end = low_pass_at(Family::Butterworth, 4, 0.2);
+    let four = proven(&alike(&front_end, 2, 8, &[0.0, 1.0, 2.0, 3.0]));
+    let two = proven(&alike(&front_end, 2, 8, &[0.0, 1.0]));
     assert!(norm(&four) <= norm(&two) * (1.0 + 1e-6) + 1e-12, "{} {}", norm(&four), norm(&two));
 }
 
@@ -67,7 +59,7 @@ fn the_noncausal_bound_counts_repeated_channels_once() {
     for method in [Method::Iir, Method::Fir] {
         let mut spec = by(method, thesis(10, &[0.6, 1.2, 2.6]));
         spec.design.taps = (method == Method::Fir).then_some(22);
-        let three = design(&spec, &DesignOptions::default()).unwrap();
+        let three = proven(&spec);
         assert!((three.bank.gamma.noncausal.unwrap() - 0.03993).abs() < 2e-5, "{:?}", three.bank.gamma);
         assert!((norm(&three) / 0.03993 - 1.0).abs() < 1e-3, "{}", norm(&three));
         verify(&three.bank).unwrap();
@@ -81,7 +73,7 @@ fn proportional_filters_are_one_measurement() {
         let mut spec = by(method, thesis(10, &[1.2, 0.6, 0.6]));
         spec.design.taps = (method == Method::Fir).then_some(22);
         amplify(&mut spec.channels[2].filter, 3.7);
-        let three = design(&spec, &DesignOptions::default()).unwrap();
+        let three = proven(&spec);
         assert!((norm(&three) / 0.03993 - 1.0).abs() < 1e-3, "{}", norm(&three));
         let proven = verify(&three.bank).unwrap();
         assert!((proven.upper / 0.03993 - 1.0).abs() < 1e-3, "{proven:?}");
@@ -92,7 +84,7 @@ fn proportional_filters_are_one_measurement() {
 fn plants(seed: u64) -> (Spec, Spec) {
     let mut dice = Random(seed);
     let family = dice.of(&[Family::Butterworth, Family::Bessel, Family::Chebyshev1]);
-    let front_end = filter(family, dice.count(1, 4), 0.05 + 0.3 * dice.part());
+    let front_end = low_pass_at(family, dice.count(1, 4), 0.05 + 0.3 * dice.part());
     let (count, ratio) = (dice.count(1, 3), dice.count(1, 3));
     let latency = dice.count(0, 12);
     let distinct: Vec<f64> =
@@ -119,8 +111,7 @@ fn repeats_change_no_recursive_bank() {
     for seed in seeds.clone() {
         let (plain, repeated) = plants(seed);
         for method in [Method::Iir, Method::H2] {
-            let [plain, repeated] = [&plain, &repeated]
-                .map(|spec| design(&by(method, spec.clone()), &DesignOptions::default()).unwrap());
+            let [plain, repeated] = [&plain, &repeated].map(|spec| proven(&by(method, spec.clone())));
             let excess = norm(&repeated) / norm(&plain) - 1.0;
             worst = worst.max(excess);
             let [least, other] = [&plain, &repeated].map(|found| found.bank.gamma.noncausal.unwrap());

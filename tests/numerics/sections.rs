@@ -1,15 +1,11 @@
 //! The form in which recursive banks are written: delay lines and parallel sections, which the runtime
 //! recognises.
 
-use hybank::bank::{Bank, StateMatrices, SynthesisFilters};
-use hybank::design::{Design, DesignError, analyze};
+use crate::support::{block, designed};
+use hybank::bank::{Bank, StateMatrices};
+use hybank::design::analyze;
 use hybank::runtime::{Options, Stream};
 use hybank::spec::Spec;
-
-/// Designs without a search for proofs, which other tests are about.
-fn design(spec: &Spec) -> Result<Design, DesignError> {
-    hybank::design::design(spec, &hybank::design::DesignOptions::without_proof())
-}
 
 fn spec(method: &str, delays: &[f64], latency: usize, target: &str) -> Spec {
     let channels: Vec<String> = delays.iter().map(|delay| format!("{{ delay = {delay} }}")).collect();
@@ -23,13 +19,6 @@ fn spec(method: &str, delays: &[f64], latency: usize, target: &str) -> Spec {
 
 const DOUBLE_POLE: &str = "{ num = [0.25], den = [1.0, 1.0, 0.25] }";
 const BUTTERWORTH: &str = "{ family = \"butterworth\", order = 5, cutoff = 0.2 }";
-
-fn block(bank: &Bank) -> &StateMatrices {
-    match &bank.filters {
-        SynthesisFilters::StateSpace(block) => block,
-        SynthesisFilters::Fir(_) => panic!("a recursive bank"),
-    }
-}
 
 /// The definition of a state-space bank, row by row.
 fn slow_run(filter: &StateMatrices, input: &[f64]) -> Vec<f64> {
@@ -53,7 +42,7 @@ fn designs_are_sections_behind_delay_lines() {
         for (filter, order, latency) in
             [(DOUBLE_POLE, 2, 0), (DOUBLE_POLE, 2, 10), (BUTTERWORTH, 5, 9), (BUTTERWORTH, 5, 60)]
         {
-            let bank = design(&spec(method, &[1.2, 0.6], latency, filter)).unwrap().bank;
+            let bank = designed(&spec(method, &[1.2, 0.6], latency, filter));
             let mut stream = Stream::new(&bank.plan(Options::default()).unwrap());
             assert_eq!(stream.plan().summary().algorithm, "parallel-form", "{method} {filter} {latency}");
             assert_eq!(stream.plan().summary().numbers, "f64");
@@ -73,7 +62,7 @@ fn designs_are_sections_behind_delay_lines() {
 #[test]
 fn the_gamma_written_is_that_of_the_sections() {
     for latency in [0, 3, 10, 41] {
-        let bank = design(&spec("iir", &[1.2, 0.6], latency, BUTTERWORTH)).unwrap().bank;
+        let bank = designed(&spec("iir", &[1.2, 0.6], latency, BUTTERWORTH));
         let read_back = Bank::from_json(&bank.to_json().unwrap(), "bank.json").unwrap();
         let gamma = analyze(&read_back, &[]).unwrap().gamma;
         assert!((gamma / bank.gamma.norm.unwrap() - 1.0).abs() < 1e-12);
@@ -83,8 +72,8 @@ fn the_gamma_written_is_that_of_the_sections() {
 
 #[test]
 fn channels_that_cannot_be_told_apart_share_a_filter_in_sections_too() {
-    let alone = design(&spec("iir", &[1.2, 0.6], 8, DOUBLE_POLE)).unwrap().bank;
-    let twice = design(&spec("iir", &[1.2, 0.6, 1.2], 8, DOUBLE_POLE)).unwrap().bank;
+    let alone = designed(&spec("iir", &[1.2, 0.6], 8, DOUBLE_POLE));
+    let twice = designed(&spec("iir", &[1.2, 0.6, 1.2], 8, DOUBLE_POLE));
     assert!((alone.gamma.norm.unwrap() / twice.gamma.norm.unwrap() - 1.0).abs() < 1e-9);
     let mut stream = Stream::new(&twice.plan(Options::default()).unwrap());
     assert_eq!(stream.plan().summary().algorithm, "parallel-form");

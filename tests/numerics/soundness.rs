@@ -4,7 +4,7 @@
 use crate::support::random::Random;
 use crate::support::specs::{alike, tf, thesis, with_taps};
 use hybank::bank::{Bank, Gamma, SynthesisFilters};
-use hybank::design::{DesignOptions, design, prove};
+use hybank::design::prove;
 use hybank::spec::{DesignSpec, Method, Spec};
 use hybank::units::Seconds;
 use hybank::verify::verify;
@@ -115,7 +115,7 @@ fn no_interval_excludes_the_true_norm_for_any_delay() {
 }
 
 fn proven(spec: &Spec) -> Bank {
-    let found = design(spec, &DesignOptions::default()).unwrap();
+    let found = crate::support::proven(spec);
     found.proof.unwrap();
     found.bank
 }

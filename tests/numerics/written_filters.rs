@@ -2,8 +2,9 @@
 //! decimals in the spec, not of roots found in doubles.
 
 use crate::support::specs::{alike, tf};
+use crate::support::{designed, proven};
 use hybank::bank::{Bank, SynthesisFilters};
-use hybank::design::{DesignOptions, ProofSearch, design, judge_taps, prove};
+use hybank::design::{ProofSearch, judge_taps, prove};
 use hybank::spec::{Family, FilterSpec, Method, Passband, Spec};
 use hybank::units::Hertz;
 
@@ -87,7 +88,7 @@ impl BandPass {
 
 /// The bank of `spec` with the tap `tap`.
 fn with_tap(spec: &Spec, tap: f64) -> Bank {
-    let mut bank = design(spec, &DesignOptions::without_proof()).unwrap().bank;
+    let mut bank = designed(spec);
     bank.filters = SynthesisFilters::Fir(vec![vec![tap]]);
     bank.gamma = Default::default();
     bank
@@ -108,7 +109,7 @@ fn rounded_coefficients_are_another_filter_than_rounded_poles() {
     for (filter, norm) in [(TWO_PER_CENT, 5.37840996311e-5), (FIVE_PER_CENT, 4.04251009858e-7)] {
         let spec = filter.spec();
         has_norm(&with_tap(&spec, 1.0), norm);
-        let designed = design(&spec, &DesignOptions::default()).unwrap();
+        let designed = proven(&spec);
         let proven = designed.proof.unwrap();
         assert!(proven.upper <= norm && proven.attained >= 0.93 * norm, "{proven:?}");
         assert!(hybank::verify::verify(&designed.bank).is_ok());
@@ -156,7 +157,7 @@ fn a_band_of_two_per_mille_is_designed_and_proven() {
     // Half a sample late, so that some error is left.
     let mut spec = alike(&narrow, 1, 1, &[0.5]);
     (spec.design.method, spec.design.taps) = (Method::Fir, Some(4));
-    let designed = design(&spec, &DesignOptions::default()).unwrap();
+    let designed = proven(&spec);
     let proven = designed.proof.unwrap();
     assert!(proven.upper < 1e-6 && proven.attained > 0.9 * proven.upper, "{proven:?}");
     assert!(hybank::verify::verify(&designed.bank).is_ok());

@@ -1,24 +1,15 @@
 //! Banks with arbitrary coefficients and all kinds of front ends: what the checker and the designer say of
 //! one error system is compared on them.
+// Each program uses a part of it.
+#![allow(dead_code)]
 
-use hybank_core::bank::{Bank, Gamma, SynthesisFilters};
-use hybank_core::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, Spec};
-use hybank_core::units::{Hertz, Seconds};
-use std::f64::consts::TAU;
+use hybank_core::bank::{Bank, SynthesisFilters};
+use hybank_core::spec::{Family, FilterSpec};
+use hybank_core::units::Seconds;
+pub(crate) use specs::{low_pass as family, thesis_filter};
 
-pub(crate) fn family(family: Family, order: usize, omega: f64) -> FilterSpec {
-    FilterSpec::Family {
-        family,
-        order: Some(order),
-        passband: Passband::LowPass { cutoff: Hertz(omega / TAU) },
-        ripple_db: family.has_ripple().then_some(0.5),
-        attenuation_db: family.has_attenuation().then_some(55.0),
-    }
-}
-
-pub(crate) fn thesis_filter() -> FilterSpec {
-    FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] }
-}
+#[path = "specs.rs"]
+pub(crate) mod specs;
 
 /// A bank with arbitrary coefficients; the comparisons hold for good and bad banks.
 pub(crate) fn bank(
@@ -30,36 +21,11 @@ pub(crate) fn bank(
     taps: usize,
 ) -> Bank {
     let made_up = |i: usize| (0..taps).map(|n| ((7 * n + 3 * i) % 11) as f64 / 11.0 - 0.4).collect();
-    let channel = |(filter, &delay)| ChannelSpec::new(Seconds(delay), filter);
-    let spec = Spec {
-        name: String::new(),
-        fast_period: Seconds(1.0),
-        ratio,
-        latency: Some(latency),
-        full_scale: None,
-        fit: Vec::new(),
-        target,
-        channels: filters.into_iter().zip(delays).map(channel).collect(),
-        signal: None,
-        uncertainty: None,
-        design: DesignSpec::new(Method::Fir, Some(taps)),
-    };
-    Bank {
-        spec: Some(spec),
-        fast_period: Seconds(1.0),
-        ratio,
-        latency,
-        method: Method::Fir,
-        samples: vec![1; delays.len()],
-        delays: delays.iter().copied().map(Seconds).collect(),
-        gains: vec![1.0; delays.len()],
-        offsets: vec![0.0; delays.len()],
-        nonlinearity: vec![hybank_core::runtime::Nonlinearity::default(); delays.len()],
-        filters: SynthesisFilters::Fir((0..delays.len()).map(made_up).collect()),
-        gamma: Gamma::default(),
-        proof: None,
-        fixed_point: None,
-    }
+    let mut spec = specs::with_taps(specs::alike(&target, ratio, latency, delays), taps);
+    spec.channels.iter_mut().zip(filters).for_each(|(channel, filter)| channel.filter = filter);
+    let filters = SynthesisFilters::Fir((0..delays.len()).map(made_up).collect());
+    let delays = delays.iter().copied().map(Seconds).collect();
+    Bank { spec: Some(spec), latency, delays, ..Bank::bare(filters, ratio) }
 }
 
 pub(crate) fn alike(filter: &FilterSpec, delays: &[f64], ratio: usize, latency: usize, taps: usize) -> Bank {

@@ -2,8 +2,8 @@
 // Each program uses a part of it.
 #![allow(dead_code)]
 
-use hybank::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, Spec};
-use hybank::units::{Hertz, Seconds};
+use hybank_core::spec::{ChannelSpec, DesignSpec, Family, FilterSpec, Method, Passband, Spec};
+use hybank_core::units::{Hertz, Seconds};
 use std::f64::consts::TAU;
 
 /// Numerator over denominator, descending powers of s.
@@ -26,6 +26,11 @@ pub(crate) fn low_pass(family: Family, order: usize, omega: f64) -> FilterSpec {
         ripple_db: family.has_ripple().then_some(0.5),
         attenuation_db: family.has_attenuation().then_some(55.0),
     }
+}
+
+/// The same with its cutoff in cycles per fast sample.
+pub(crate) fn low_pass_at(family: Family, order: usize, cutoff: f64) -> FilterSpec {
+    low_pass(family, order, TAU * cutoff)
 }
 
 /// Butterworth low-pass with its cutoff in rad/s.

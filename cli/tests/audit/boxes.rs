@@ -5,9 +5,9 @@ use super::judge::Judge;
 use super::optimum::optimum;
 use super::plant::{Errors, Library, Plant};
 use super::plants::family;
-use super::statements::{Outcome, Tally, at, campaign, designed, judged, verified};
+use super::statements::{Tally, at, campaign, designed, examined};
 use crate::support::random::Random;
-use crate::support::{Desk, words};
+use crate::support::{Desk, repository, words};
 use serde_json::{Value, json};
 use std::f64::consts::{PI, TAU};
 
@@ -162,24 +162,21 @@ fn half_widths(dice: &mut Random, channels: usize) -> Errors {
     Errors { delays: vec![size; channels], gains: vec![gains; channels], cutoffs: vec![cutoffs; channels] }
 }
 
-fn boxed(seed: u64) -> Tally {
+fn boxed(seed: u64) -> Result<Tally, Tally> {
     let mut dice = Random(SEED + seed);
     let spec = plant(&mut dice);
     let desk = Desk::empty();
     let mut tally = Tally { cases: 1, ..Tally::default() };
     let name = format!("box {seed}: {spec}");
-    let Outcome::Bank { bank, .. } = designed(&desk, &spec) else {
-        tally.unproven.push(format!("{name}: no bank"));
-        return tally;
-    };
+    let (bank, _) = designed(&desk, &name, &spec)?;
     let half = half_widths(&mut dice, spec["channel"].as_array().map_or(1, Vec::len));
     let [delay, gain, cutoff] = [&half.delays, &half.gains, &half.cutoffs].map(|list| list[0].to_string());
     let boxes = format!("--delay-box {delay}samples --gain-box {gain} --cutoff-box {cutoff}");
     let analyze = format!("analyze bank.json --json --reference none {boxes}");
     let output = desk.run(&words(&analyze), &[]);
     let Ok(report) = serde_json::from_slice::<Value>(&output.stdout) else {
-        tally.refused.push(format!("{name}, {half:?}: {}", String::from_utf8_lossy(&output.stderr)));
-        return tally;
+        let reason = String::from_utf8_lossy(&output.stderr);
+        return Err(Tally::refused(&format!("{name}, {half:?}"), &reason));
     };
     let case = &report["worst_case"];
     let number = |key: &str| at(case, key).unwrap_or(f64::NAN);
@@ -199,7 +196,7 @@ fn boxed(seed: u64) -> Tally {
     }
     tally.widths.push(upper / lower - 1.0);
     tally.excesses.push(found.gain / lower - 1.0);
-    tally
+    Ok(tally)
 }
 
 /// The taps of least worst norm over the centre and the vertices of the box.
@@ -222,7 +219,7 @@ fn robust_taps(bank: &Value, half: &Errors, count: usize, dice: &mut Random) -> 
 }
 
 /// A robust design.
-fn uncertain(seed: u64) -> Tally {
+fn uncertain(seed: u64) -> Result<Tally, Tally> {
     let mut dice = Random(SEED + 0x800 + seed);
     let mut spec = plant(&mut dice);
     let channels = spec["channel"].as_array().map_or(1, Vec::len);
@@ -244,19 +241,8 @@ fn uncertain(seed: u64) -> Tally {
     }
     spec["uncertainty"] = table;
     let name = format!("robust {seed}: {spec}");
-    let desk = Desk::empty();
-    let (bank, report) = match designed(&desk, &spec) {
-        Outcome::Bank { bank, report } => (bank, report),
-        Outcome::Refused(reason) => {
-            let refused = vec![format!("{name}: {reason}")];
-            return Tally { cases: 1, refused, ..Tally::default() };
-        }
-    };
-    let proven = verified(&desk);
-    let mut tally = judged(&name, &bank, proven.as_ref());
-    tally.widths.clear();
-    tally.excesses.clear();
-    tally.notes.clear();
+    let (bank, report, tally) = examined(&Desk::empty(), &name, &spec)?;
+    let mut tally = tally.without_figures();
     let study = &report["robust"];
     let half = errors_of(&study["errors"], 1.0);
     let mut search = Search { bank: &bank, half: &half, library: Library::default() };
@@ -290,7 +276,7 @@ fn uncertain(seed: u64) -> Tally {
             tally.notes.push(format!("{name}: worst {:e}, reachable {reachable:e}", found.gain));
         }
     }
-    tally
+    Ok(tally)
 }
 
 #[test]
@@ -307,7 +293,7 @@ fn no_worst_case_of_a_robust_bank_is_exceeded() {
 /// bank by the search, of the best bank by the judge's own taps.
 #[test]
 fn the_worst_cases_in_the_docs_are_true() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../filters/thesis-fir.json");
+    let path = repository("filters/thesis-fir.json");
     let bank: Value = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
     for (size, nominal, robust) in [(0.1, 0.047_833_8, 0.044_295_9), (0.2, 0.068_209_0, 0.063_542_5)] {
         let half = Errors { delays: vec![size; 2], ..Errors::none(2) };

@@ -7,10 +7,10 @@ use super::optimum::optimum;
 use super::plant::{Errors, Library, Plant};
 use super::real::{Complex, pi, real};
 use crate::support::random::Random;
+use crate::support::repository;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
 use std::fs;
-use std::path::Path;
 
 /// A spec as a bank file writes it, h = 1, one filter for all.
 fn alike(filter: &Value, ratio: usize, delays: &[f64]) -> Value {
@@ -55,7 +55,7 @@ fn the_judge_finds_the_golden_numbers() {
 /// K K* is the mean over aliases of v v*, v the error that e^{j nu t} leaves; and G13's bank of `filters`.
 #[test]
 fn the_judge_agrees_with_brute_force() {
-    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("filters");
+    let folder = repository("filters");
     for (name, norm) in [("thesis-fir.json", 0.039_932_04), ("thesis-iir.json", 0.039_932_0)] {
         let bank: Value = serde_json::from_slice(&fs::read(folder.join(name)).unwrap()).unwrap();
         close(name, Judge::of(&bank).norm(&[]).gain, norm, 1e-5);
@@ -95,10 +95,7 @@ fn the_judge_agrees_with_brute_force() {
 /// The families against zeros and poles of `scipy.signal` (the file that the product's tests read too).
 #[test]
 fn the_families_have_the_poles_of_scipy() {
-    let text = fs::read_to_string(
-        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
-            .join("verify/src/analog/families/reference.txt"),
-    );
+    let text = fs::read_to_string(repository("verify/src/analog/families/reference.txt"));
     let mut dice = Random(0xA0D1);
     let mut tried = 0;
     for line in text.unwrap().lines().filter(|line| line.starts_with("scipy ")) {

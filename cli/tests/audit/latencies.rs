@@ -3,7 +3,7 @@
 
 use super::plant::{Correlation, Errors, Library, Plant};
 use super::plants::family;
-use super::statements::{Outcome, Tally, campaign, designed};
+use super::statements::{Tally, campaign, designed};
 use crate::support::Desk;
 use crate::support::random::Random;
 use nalgebra::{DMatrix, DVector};
@@ -65,7 +65,7 @@ fn errors(plant: &Plant, taps: usize, noise: f64, latencies: usize) -> Vec<f64> 
     squares.into_iter().map(|square: f64| square.max(0.0).sqrt()).collect()
 }
 
-fn audited(seed: u64) -> Tally {
+fn audited(seed: u64) -> Result<Tally, Tally> {
     let mut dice = Random(SEED + seed);
     let ratio = dice.count(1, 3);
     let channels = dice.count(1, 3);
@@ -84,14 +84,7 @@ fn audited(seed: u64) -> Tally {
     let spec = json!({ "fast_period": 1.0, "ratio": ratio, "target": { "filter": filter }, "channel": list, "design": design });
     let name = format!("latency {seed}: {spec}");
     let mut tally = Tally { cases: 1, ..Tally::default() };
-    let desk = Desk::empty();
-    let report = match designed(&desk, &spec) {
-        Outcome::Bank { report, .. } => report,
-        Outcome::Refused(reason) => {
-            tally.refused.push(format!("{name}: {reason}"));
-            return tally;
-        }
-    };
+    let (_, report) = designed(&Desk::empty(), &name, &spec)?;
     let chosen = report["latency"].as_u64().expect("a latency") as usize;
     let plant = Plant::new(&spec, 0, &Errors::none(channels), &mut Library::default());
     let oldest = (spread * ratio as f64).ceil() as usize;
@@ -111,7 +104,7 @@ fn audited(seed: u64) -> Tally {
         ));
     }
     tally.excesses.push(errors[chosen] / best - 1.0);
-    tally
+    Ok(tally)
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::judge::{Filters, Judge, on_circle};
 use super::optimum::optimum;
 use super::plants::{as_coefficients, as_roots, plant};
-use super::statements::{Outcome, Tally, at, campaign, designed, judged, verified};
+use super::statements::{Tally, at, campaign, designed, examined, judged, verified};
 use crate::support::Desk;
 use crate::support::forgery::{forged, numbers, parts, sealed};
 use crate::support::random::Random;
@@ -26,12 +26,8 @@ const PRINTED: f64 = 1e-8;
 const FREQUENCIES: usize = 48;
 const CANDIDATES: usize = 4;
 
-fn refused(name: &str, reason: &str) -> Tally {
-    Tally { cases: 1, refused: vec![format!("{name}: {reason}")], ..Tally::default() }
-}
-
 /// A band-pass of Q up to 10,000, its target in one form and its channel in another.
-fn narrow(seed: u64) -> Tally {
+fn narrow(seed: u64) -> Result<Tally, Tally> {
     let mut dice = Random(SEED + seed);
     let (centre, width) = (0.05 + 0.35 * dice.part(), 10f64.powf(-1.0 - 3.0 * dice.part()));
     let mut family = json!({ "family": dice.of(&["butterworth", "chebyshev1"]), "order": dice.count(1, 6),
@@ -48,11 +44,12 @@ fn narrow(seed: u64) -> Tally {
     let spec = json!({ "fast_period": 1.0, "ratio": ratio, "latency": dice.count(1, 3),
         "target": { "filter": forms[target] }, "channel": list,
         "design": { "method": "fir", "taps": ratio * dice.count(1, 4) } });
-    verdict(&format!("narrow {seed}, Q {:.0}: {spec}", 1.0 / width), &spec)
+    let name = format!("narrow {seed}, Q {:.0}: {spec}", 1.0 / width);
+    examined(&Desk::empty(), &name, &spec).map(|(.., tally)| tally)
 }
 
 /// Two like channels whose samples are 1.2e-10 fast periods apart: taps of 1e9, of which little is left.
-fn near(seed: u64) -> Tally {
+fn near(seed: u64) -> Result<Tally, Tally> {
     let mut dice = Random(SEED + 0x1000 + seed);
     let share = 0.03 * 15f64.powf(dice.part());
     let filter = super::plants::family(&mut dice, share);
@@ -67,22 +64,7 @@ fn near(seed: u64) -> Tally {
     };
     let spec = json!({ "fast_period": 1.0, "ratio": ratio, "latency": dice.count(0, 8),
         "target": { "filter": filter }, "channel": list, "design": design });
-    verdict(&format!("near {seed}: {spec}"), &spec)
-}
-
-/// What the judge finds of a spec's bank.
-fn verdict(name: &str, spec: &Value) -> Tally {
-    let desk = Desk::empty();
-    let (bank, report) = match designed(&desk, spec) {
-        Outcome::Bank { bank, report } => (bank, report),
-        Outcome::Refused(reason) => return refused(name, &reason),
-    };
-    let proven = verified(&desk);
-    let mut tally = judged(name, &bank, proven.as_ref());
-    if proven.is_none() {
-        tally.unproven.push(format!("{name}: {}", report["unproven"]));
-    }
-    tally
+    examined(&Desk::empty(), &format!("near {seed}: {spec}"), &spec).map(|(.., tally)| tally)
 }
 
 /// Gamma as small as the rounding of the instants: what is proven holds for the delays of the file, in
@@ -100,7 +82,7 @@ fn a_tiny_gamma_is_that_of_the_delays_in_the_file() {
         ],
         "design": { "method": "fir", "taps": 12 } });
     let desk = Desk::empty();
-    let Outcome::Bank { bank, .. } = designed(&desk, &spec) else { panic!("no bank") };
+    let Ok((bank, _)) = designed(&desk, "tiny", &spec) else { panic!("no bank") };
     let proven = verified(&desk).expect("a proof");
     let [attained, upper] = ["/attained", "/upper"].map(|key| at(&proven, key).expect("a bound"));
     let norm = Judge::of(&bank).norm(&[]).gain;
@@ -109,25 +91,14 @@ fn a_tiny_gamma_is_that_of_the_delays_in_the_file() {
 }
 
 /// What is printed of a reduced bank; without states against the best taps that see one frame.
-fn reduced(seed: u64) -> Tally {
+fn reduced(seed: u64) -> Result<Tally, Tally> {
     let mut dice = Random(SEED + 0x400 + seed);
     let mut spec = plant(&mut dice);
     let order = dice.of(&[0, 0, 1, 2, 4, 6]);
     spec["design"] = json!({ "method": "iir", "order": order });
     let name = format!("reduction {seed}: {spec}");
-    let desk = Desk::empty();
-    let (bank, report) = match designed(&desk, &spec) {
-        Outcome::Bank { bank, report } => (bank, report),
-        Outcome::Refused(reason) => return refused(&name, &reason),
-    };
-    let proven = verified(&desk);
-    let mut tally = judged(&name, &bank, proven.as_ref());
-    tally.widths.clear();
-    tally.excesses.clear();
-    tally.notes.clear();
-    if proven.is_none() {
-        tally.unproven.push(format!("{name}: {}", report["unproven"]));
-    }
+    let (bank, report, tally) = examined(&Desk::empty(), &name, &spec)?;
+    let mut tally = tally.without_figures();
     let judge = Judge::of(&bank);
     let norm = judge.norm(&[]).gain;
     if let Some(printed) = at(&report, "/reduction/reduced/gamma")
@@ -147,11 +118,11 @@ fn reduced(seed: u64) -> Tally {
             tally.notes.push(format!("{name}: norm {norm:e}, {:e} with the taps {:?}", best.norm, best.taps));
         }
     }
-    tally
+    Ok(tally)
 }
 
 /// Integer taps against all integer taps, ratio 1.
-fn integer(seed: u64) -> Tally {
+fn integer(seed: u64) -> Result<Tally, Tally> {
     let mut dice = Random(SEED + 0x800 + seed);
     let share = 0.05 + 0.3 * dice.part();
     let filter = super::plants::family(&mut dice, share);
@@ -162,15 +133,8 @@ fn integer(seed: u64) -> Tally {
     let spec = json!({ "fast_period": 1.0, "ratio": 1, "latency": dice.count(0, 2), "target": { "filter": filter },
         "channel": list, "design": { "method": "fir", "taps": taps, "bits": bits, "fraction_bits": fraction } });
     let name = format!("integers {seed}: {spec}");
-    let desk = Desk::empty();
-    let bank = match designed(&desk, &spec) {
-        Outcome::Bank { bank, .. } => bank,
-        Outcome::Refused(reason) => return refused(&name, &reason),
-    };
-    let mut tally = judged(&name, &bank, verified(&desk).as_ref());
-    tally.widths.clear();
-    tally.excesses.clear();
-    tally.notes.clear();
+    let (bank, _, tally) = examined(&Desk::empty(), &name, &spec)?;
+    let mut tally = tally.without_figures();
     let mut judge = Judge::of(&bank);
     let norm = judge.norm(&[]).gain;
     let best = exhaustive(&mut judge, taps, bits, fraction);
@@ -178,7 +142,7 @@ fn integer(seed: u64) -> Tally {
     if norm > best * 1.01 {
         tally.notes.push(format!("{name}: norm {norm:e}, best {best:e}"));
     }
-    tally
+    Ok(tally)
 }
 
 /// The least norm of all integer taps: all by a grid in doubles, the best of these by the judge.
@@ -220,7 +184,7 @@ fn exhaustive(judge: &mut Judge, taps: usize, bits: u32, fraction: u32) -> f64 {
 }
 
 /// Files whose numbers were changed and whose digest is right: refused, or all that they say is true.
-fn forgeries(seed: u64) -> Tally {
+fn forgeries(seed: u64) -> Result<Tally, Tally> {
     let mut dice = Random(SEED + 0xC00 + seed);
     let mut spec = plant(&mut dice);
     let taps = spec["ratio"].as_u64().unwrap_or(1) * dice.count(1, 3) as u64;
@@ -231,9 +195,7 @@ fn forgeries(seed: u64) -> Tally {
         .unwrap_or(json!({ "method": "iir" }));
     let name = format!("forged {seed}");
     let desk = Desk::empty();
-    let Outcome::Bank { bank, .. } = designed(&desk, &spec) else {
-        return refused(&name, "no bank to forge");
-    };
+    let (bank, _) = designed(&desk, &name, &spec)?;
     let mut tally = Tally::default();
     for trial in 0..FORGERIES {
         let mut document = bank.clone();
@@ -253,19 +215,15 @@ fn forgeries(seed: u64) -> Tally {
         match verified(&desk) {
             None => tally.refused.push(format!("{name}: refused")),
             Some(proven) => {
-                let mut found = judged(&name, &serde_json::from_str(&text).expect("a file"), Some(&proven));
-                found.cases = 0;
-                found.widths.clear();
-                found.excesses.clear();
-                found.notes.clear();
-                tally.add(found);
+                let found = judged(&name, &serde_json::from_str(&text).expect("a file"), Some(&proven));
+                tally.add(Tally { cases: 0, ..found.without_figures() });
             }
         }
     }
     // Refusals are what is wanted here.
     println!("{name}: {} of {} refused", tally.refused.len(), tally.cases);
     tally.refused.clear();
-    tally
+    Ok(tally)
 }
 
 #[test]

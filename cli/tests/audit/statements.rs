@@ -24,23 +24,27 @@ const NOTEWORTHY: f64 = 1e-4;
 const PERIODS: i64 = 24;
 const SETTLED: f64 = 1e-6;
 
-/// What became of a spec.
-pub(crate) enum Outcome {
-    /// No bank, with the program's reason.
-    Refused(String),
-    /// A bank as its file says, and the report of the design.
-    Bank { bank: Value, report: Value },
-}
-
-/// Designs `spec` and reads the file that was written.
-pub(crate) fn designed(desk: &Desk, spec: &Value) -> Outcome {
+/// Designs `spec`: the bank as its file says, and the report of the design; a tally with the program's
+/// reason where there is none.
+pub(crate) fn designed(desk: &Desk, name: &str, spec: &Value) -> Result<(Value, Value), Tally> {
     desk.write("spec.toml", toml::to_string(spec).expect("a spec"));
     let output = desk.run(&["design", "--prove", "spec.toml", "-o", "bank.json", "--json", "--force"], &[]);
     if !output.status.success() {
-        return Outcome::Refused(String::from_utf8_lossy(&output.stderr).into_owned());
+        return Err(Tally::refused(name, &String::from_utf8_lossy(&output.stderr)));
     }
     let report = serde_json::from_slice(&output.stdout).expect("a report");
-    Outcome::Bank { bank: desk.read_json("bank.json"), report }
+    Ok((desk.read_json("bank.json"), report))
+}
+
+/// As [`designed`], with what the judge finds of the bank and of what `verify` says of it.
+pub(crate) fn examined(desk: &Desk, name: &str, spec: &Value) -> Result<(Value, Value, Tally), Tally> {
+    let (bank, report) = designed(desk, name, spec)?;
+    let proven = verified(desk);
+    let mut tally = judged(name, &bank, proven.as_ref());
+    if proven.is_none() {
+        tally.unproven.push(format!("{name}: {}", report["unproven"]));
+    }
+    Ok((bank, report, tally))
 }
 
 /// What `verify` says of `bank.json` in the folder; `None` if it refuses the file.
@@ -70,6 +74,16 @@ pub(crate) struct Tally {
 }
 
 impl Tally {
+    /// A case without a bank.
+    pub(crate) fn refused(name: &str, reason: &str) -> Self {
+        Self { cases: 1, refused: vec![format!("{name}: {reason}")], ..Self::default() }
+    }
+
+    /// Without what is no news of banks of this kind.
+    pub(crate) fn without_figures(self) -> Self {
+        Self { notes: Vec::new(), widths: Vec::new(), excesses: Vec::new(), ..self }
+    }
+
     pub(crate) fn add(&mut self, other: Self) {
         self.cases += other.cases;
         self.refused.extend(other.refused);
@@ -112,12 +126,13 @@ impl Tally {
     }
 }
 
-/// All cases of a campaign, `usual` ones unless the environment asks for others.
-pub(crate) fn campaign(usual: usize, name: &str, task: impl Fn(u64) -> Tally + Sync) {
+/// All cases of a campaign, `usual` ones unless the environment asks for others; a task ends early where
+/// there is no bank.
+pub(crate) fn campaign(usual: usize, name: &str, task: impl Fn(u64) -> Result<Tally, Tally> + Sync) {
     let mut whole = Tally::default();
     // Each case as it ends, so that what an interrupted campaign found is not lost.
     let told = |seed: u64| {
-        let tally = task(seed);
+        let tally = task(seed).unwrap_or_else(|refused| refused);
         tally.tell(name, seed);
         tally
     };

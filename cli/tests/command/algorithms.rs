@@ -1,7 +1,7 @@
 //! Algorithms of FIR filters, as a user chooses them: all give the same samples at the same time.
 //! The direct algorithm is the measure of the other.
 
-use crate::support::{Desk, bytes, channel, floats, wav};
+use crate::support::{Desk, bytes, channel, floats, modelled, wav};
 use serde_json::Value;
 
 const COUNT: usize = 3000;
@@ -12,18 +12,7 @@ fn desk() -> Desk {
     let taps = |seed: usize| -> Vec<f64> {
         (0..600).map(|t| ((t * 37 + seed * 11) % 101) as f64 / 1000.0 - 0.05).collect()
     };
-    let channel = |seed| serde_json::json!({ "delay": 0.0, "taps": taps(seed) });
-    let spec = serde_json::json!({
-        "fast_period": 1.0, "ratio": 2, "latency": 7,
-        "target": { "filter": { "family": "butterworth", "order": 2, "cutoff": 0.4 } },
-        "channel": [{ "delay": 0.0 }, { "delay": 0.0 }], "design": { "method": "fir", "taps": 600 }
-    });
-    let bank = serde_json::json!({
-        "format": "hybank-bank", "version": 1, "spec": spec, "fast_period": 1.0, "ratio": 2, "latency": 7,
-        "method": "fir", "channels": [channel(1), channel(2)], "state_space": null,
-        "gamma": { "upper": null, "lower": null, "noncausal": null }
-    });
-    desk.write("long.json", bank.to_string());
+    desk.write_bank("long.json", &modelled(vec![taps(1), taps(2)], &[0.0; 2], 2, 7));
     desk.write("frames", bytes(&input()));
     for (i, name) in ["a.wav", "b.wav"].into_iter().enumerate() {
         wav::write(&desk, name, 1, 24_000, &channel_of(i));

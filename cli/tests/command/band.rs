@@ -1,10 +1,9 @@
 //! The signal's band in a new user's first result.
 
 use crate::calibrate::design;
-use crate::support::Desk;
+use crate::support::{Desk, repository};
 use serde_json::Value;
 use std::fs;
-use std::path::Path;
 
 /// The value at a pointer of a report.
 fn number(report: &Value, pointer: &str) -> f64 {
@@ -13,8 +12,7 @@ fn number(report: &Value, pointer: &str) -> f64 {
 
 /// The first block of a language in README.md.
 fn readme_block(language: &str) -> String {
-    let readme =
-        fs::read_to_string(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("README.md")).unwrap();
+    let readme = fs::read_to_string(repository("README.md")).unwrap();
     let start = readme.find(&format!("```{language}\n")).unwrap() + language.len() + 4;
     let end = readme[start..].find("```").unwrap();
     readme[start..start + end].to_owned()

@@ -1,8 +1,8 @@
 //! `fuse --bit-true` against the exported C and against integers without limits.
 
-use crate::export::{bank, compiled, piped, samples, with_wild_integers};
-use crate::support::{Desk, THESIS, number};
-use hound::{SampleFormat, WavReader, WavSpec, WavWriter};
+use crate::export::{bank, compiled, integers_piped, samples, with_wild_integers};
+use crate::support::{Desk, THESIS, number, wav};
+use hound::WavReader;
 
 /// A desk with a bank of 8-bit taps of wild values, so that sums round and saturate.
 fn desk(fraction_bits: i32) -> Desk {
@@ -21,12 +21,14 @@ fn captures(desk: &Desk, bits: u16) -> Vec<i32> {
     let most = (1_i64 << (bits - 1)) - 1;
     let mut input: Vec<i32> = samples(2 * 500).iter().map(|x| (x * most as f64) as i32).collect();
     input.extend([most, -most - 1, -most - 1, most, most, most].map(|x| x as i32));
-    let spec =
-        WavSpec { channels: 2, sample_rate: 8000, bits_per_sample: bits, sample_format: SampleFormat::Int };
-    let mut wav = WavWriter::create(desk.path("in.wav"), spec).unwrap();
-    input.iter().for_each(|x| wav.write_sample(*x).unwrap());
-    wav.finalize().unwrap();
+    wav::write_integers(desk, "in.wav", bits, &input);
     input
+}
+
+/// What the compiled C gives, in samples of so many bits.
+fn by_c(desk: &Desk, input: &[i32], bits: u16) -> Vec<i32> {
+    let most = i32::MAX >> (32 - bits);
+    integers_piped(desk, input).into_iter().map(|y| y.clamp(-most - 1, most)).collect()
 }
 
 fn output(desk: &Desk) -> Vec<i32> {
@@ -44,12 +46,7 @@ fn the_model_has_the_bits_of_the_exported_c() {
         if !compiled(&desk, "int32_t", 2, 2) {
             return;
         }
-        let c = piped(&desk, input.iter().flat_map(|x| x.to_le_bytes()).collect());
-        let most = (1_i64 << (bits - 1)) - 1;
-        let c: Vec<i32> = c
-            .chunks_exact(4)
-            .map(|b| i64::from(i32::from_le_bytes(b.try_into().unwrap())).clamp(-most - 1, most) as i32)
-            .collect();
+        let c = by_c(&desk, &input, bits);
         let report = desk.report(&[&FUSE[..], &["--keep-latency"]].concat());
         assert!(output(&desk) == c, "{bits} bits");
         assert!(number(&report, "/saturated") > 0.0 && number(&report, "/wrapped") == 0.0, "{report}");
@@ -98,9 +95,7 @@ fn offsets_are_subtracted_from_the_sums() {
         let needed = number(&report, "/needed_accumulator_bits");
         assert!(number(&report, "/wrapped") == 0.0 && 1 + largest.ilog2() < needed as u32, "{report}");
         if compiled(&desk, "int32_t", 2, 2) {
-            let c = piped(&desk, input.iter().flat_map(|x| x.to_le_bytes()).collect());
-            let c = c.chunks_exact(4).map(|b| i32::from_le_bytes(b.try_into().unwrap()));
-            assert!(c.map(|y| i128::from(y).clamp(-most - 1, most) as i32).eq(want), "{bits} bits");
+            assert!(by_c(&desk, &input, bits) == want, "{bits} bits");
         }
     }
 }
@@ -111,16 +106,13 @@ fn short_captures_give_as_many_samples_as_without_the_model() {
     let desk = Desk::with_spec(THESIS);
     desk.good(&["design", "spec.toml", "-o", "b.json", "--taps", "22", "--bits", "8", "--latency", "9"]);
     for frames in [1, 2, 5, 40] {
-        let spec =
-            WavSpec { channels: 2, sample_rate: 8000, bits_per_sample: 16, sample_format: SampleFormat::Int };
-        let mut wav = WavWriter::create(desk.path("in.wav"), spec).unwrap();
-        (0..2 * frames).for_each(|k| wav.write_sample((k * 7919 % 20_000) as i16).unwrap());
-        wav.finalize().unwrap();
+        let input: Vec<i32> = (0..2 * frames).map(|k| k * 7919 % 20_000).collect();
+        wav::write_integers(&desk, "in.wav", 16, &input);
         desk.good(&[&FUSE[..], &["--force"]].concat());
         let model = output(&desk);
         desk.good(&["fuse", "b.json", "in.wav", "-o", "out.wav", "--bits", "16", "--force"]);
         let floats = output(&desk);
-        assert_eq!((model.len(), floats.len()), (2 * frames, 2 * frames));
+        assert_eq!((model.len(), floats.len()), (input.len(), input.len()));
         assert!(model.iter().zip(&floats).all(|(a, b)| (a - b).abs() <= 1), "{model:?} {floats:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! The snippets of the pages work as they stand: specs and banks can be read, and command lines
 //! run in the order of the text.
 
-use crate::support::Desk;
+use crate::support::{Desk, repository};
 use hybank::bank::Bank;
 use hybank::spec::Spec;
 use std::fs;
@@ -39,14 +39,10 @@ fn snippets(markdown: &str) -> Vec<Snippet> {
     found
 }
 
-fn readme() -> PathBuf {
-    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("README.md")
-}
-
 /// README.md and the pages of these folders; hybank-ibr has tests of its own.
 fn pages() -> Vec<PathBuf> {
-    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
-    let mut pages = vec![readme()];
+    let root = repository("");
+    let mut pages = vec![repository("README.md")];
     for folder in ["docs", "docs/tutorials", "filters", "benches", "examples"] {
         let folder = fs::read_dir(root.join(folder)).expect("a folder of pages");
         pages.extend(folder.map(|entry| entry.expect("an entry").path()));
@@ -64,7 +60,7 @@ struct Folder {
 
 impl Folder {
     fn new(page: &Path) -> Self {
-        let readme = fs::read_to_string(readme()).expect("README.md");
+        let readme = fs::read_to_string(repository("README.md")).expect("README.md");
         let spec = snippets(&readme).into_iter().find(|snippet| snippet.language == "toml");
         let desk = Desk::with_spec(&spec.expect("a spec in README.md").text);
         desk.write("speech-2x.toml", include_str!("../../../filters/speech-2x.toml"));
@@ -149,7 +145,7 @@ fn snippets_of_readme_and_docs_work() {
     for page in pages() {
         let folder = Folder::new(&page);
         let text = fs::read_to_string(&page).expect("a page");
-        let is_run = is_slow || page == readme();
+        let is_run = is_slow || page == repository("README.md");
         let checked = snippets(&text).into_iter().filter(|snippet| is_run || snippet.language != "sh");
         checked.for_each(|snippet| folder.check(&snippet));
     }

@@ -1,22 +1,19 @@
 //! What instruments and converters write, in its own scale: element types, codes in wider words, I and Q.
 
 use crate::support::{Desk, wav};
+use hybank::bank::{Bank, SynthesisFilters};
 use serde_json::Value;
-
-/// A bank whose output is its input: one of two converters after the other.
-const TURNS: &str = r#"{ "format": "hybank-bank", "version": 1, "spec": null, "fast_period": 1.0, "ratio": 2,
-    "latency": 0, "method": "fir", "channels": [{ "delay": 0.0, "taps": [1, 0] },
-    { "delay": 0.0, "taps": [0, 1] }], "state_space": null,
-    "gamma": { "upper": null, "lower": null, "noncausal": null } }"#;
 
 /// Codes of 12 bits, many of them, some odd.
 fn codes() -> Vec<i64> {
     (0..2000).map(|k| (2047.0 * (0.1 * f64::from(k)).sin()).round() as i64).collect()
 }
 
+/// With a bank whose output is its input: one of two converters after the other.
 fn desk() -> Desk {
     let desk = Desk::empty();
-    desk.write("turns.json", TURNS);
+    let taps = vec![vec![1.0, 0.0], vec![0.0, 1.0]];
+    desk.write_bank("turns.json", &Bank::bare(SynthesisFilters::Fir(taps), 2));
     desk
 }
 
@@ -152,13 +149,10 @@ fn samples_are_fused_at_their_stamps() {
     desk.write("b.csv", table(0.4));
     let report = desk.report(&["fuse", "bank.json", "a.csv", "b.csv", "--stamps", "-o", "y.wav"]);
     let begin = report["begin"].as_f64().unwrap();
-    let (mut error, mut power) = (0.0, 0.0);
-    for (n, y) in wav::samples(&desk, "y.wav").iter().enumerate().skip(100).take(3600) {
-        let wanted = value(begin + 1e-3 * n as f64);
-        error += (f64::from(*y) - wanted).powi(2);
-        power += wanted * wanted;
-    }
-    assert!(10.0 * f64::log10(power / error) > 60.0, "{}", 10.0 * f64::log10(power / error));
+    let fused = &wav::samples(&desk, "y.wav")[..3800];
+    let wanted: Vec<f32> = (0..3800).map(|n| value(begin + 1e-3 * f64::from(n)) as f32).collect();
+    let snr = wav::snr_db(fused, &wanted, 100);
+    assert!(snr > 60.0, "{snr}");
     let refused = ["fuse", "bank.json", "a.csv", "--stamps", "-o", "z.wav"];
     desk.refused(1, &refused, &["2 channels, but the tables have 1 column"]);
     let rare: String =

@@ -1,14 +1,13 @@
 //! The scripts of `examples/` run as a user starts them.
 
-use crate::support::text;
+use crate::support::{repository, text};
 use std::path::Path;
 use std::process::Command;
 
 /// Runs the script of a folder of examples in a folder of its own; gives what it printed.
 #[cfg(unix)]
 fn run_script(example: &str, folder: &Path) -> String {
-    let script =
-        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("examples").join(example).join("run.sh");
+    let script = repository(&format!("examples/{example}/run.sh"));
     let binary = Path::new(env!("CARGO_BIN_EXE_hybank")).parent().unwrap();
     let path = std::env::join_paths([binary, Path::new("/usr/bin"), Path::new("/bin")]).unwrap();
     let output = Command::new("sh").arg(script).arg(folder).env("PATH", path).output().unwrap();

@@ -1,6 +1,8 @@
 //! Captures as tables, NumPy arrays, raw and complex samples. As a user runs it.
 
-use crate::support::{Desk, THESIS, bytes, channel, floats, frames, fused, interleaved, text, wav};
+use crate::support::{
+    Desk, THESIS, bytes, channel, floats, frames, fused, interleaved, repository, text, wav,
+};
 use serde_json::Value;
 use std::fmt::Write as _;
 
@@ -74,8 +76,8 @@ fn captures_of_every_kind_give_the_same_samples() {
         assert!(wav::samples(&desk, "out.wav") == want, "{inputs:?} {more:?}");
     }
     // Live, too, and line by line.
-    let streamed = desk.run(&["stream", "bank.json", "--input", "a.csv", "--input", "b.npy"], &[]);
-    assert!(streamed.status.success() && floats(&streamed.stdout) == fused(&both), "{streamed:?}");
+    let streamed = desk.piped(&["stream", "bank.json", "--input", "a.csv", "--input", "b.npy"], &[]);
+    assert!(floats(&streamed) == fused(&both));
     for (args, parts) in [
         (&["a.raw", "b.raw", "--channel", "1", "--interleaved", "2"][..], &["--interleaved"][..]),
         (&["wide.wav", "--channels", "2"], &["--channels", "--format"]),
@@ -91,8 +93,7 @@ fn captures_of_every_kind_give_the_same_samples() {
 #[test]
 fn captures_of_matlab_are_fused() {
     let desk = Desk::new();
-    let seeds =
-        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("core/tests/fixtures/mat");
+    let seeds = repository("core/tests/fixtures/mat");
     for name in ["compressed.mat", "several.mat", "complex.mat"] {
         std::fs::copy(seeds.join(name), desk.path(name)).unwrap();
     }
@@ -109,11 +110,8 @@ fn captures_of_matlab_are_fused() {
     assert!(floats(&streamed.stdout) == want, "{streamed:?}");
     let measured = desk.report(&["measure", "compressed.mat", "--channel", "1", "--harmonics", "1"]);
     assert_eq!(measured["rate_hertz"], 24_000.0, "{measured}");
-    desk.refused(
-        1,
-        &["fuse", "bank.json", "several.mat", "-o", "n.wav"],
-        &["choose one, as several.mat:left"],
-    );
+    let several = ["fuse", "bank.json", "several.mat", "-o", "n.wav"];
+    desk.refused(1, &several, &["choose one, as several.mat:left"]);
     let same = ["fuse", "bank.json", "several.mat:left", "several.mat:right", "-o", "several.mat", "--force"];
     desk.refused(1, &same, &["several.mat"]);
 }
@@ -122,13 +120,11 @@ fn captures_of_matlab_are_fused() {
 #[test]
 fn flac_recordings_are_captures() {
     let desk = Desk::new();
-    let fixture =
-        std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("core/tests/fixtures/two.flac");
     let sample =
         |n: usize, f: f64| (16e3 * (std::f64::consts::TAU * f * n as f64 / 24e3).sin()).round() as f32;
     let input: Vec<f32> =
         (0..3000).flat_map(|n| [sample(n, 1e3), sample(n, 1.7e3)].map(|x| x / 32768.0)).collect();
-    std::fs::copy(fixture, desk.path("two.flac")).unwrap();
+    std::fs::copy(repository("core/tests/fixtures/two.flac"), desk.path("two.flac")).unwrap();
     let report = desk.report(&["fuse", "bank.json", "two.flac", "-o", "y.wav", "--keep-latency"]);
     assert_eq!(report["samples"], 6000);
     assert!(wav::read(&desk.path("y.wav")).1 == fused(&input));
@@ -147,9 +143,7 @@ fn complex_samples_run_through_both_parts() {
     let desk = Desk::new();
     let (input, parts) = complex(3000);
     let want = interleaved(&fused(&parts[0]), &fused(&parts[1]));
-    let output = desk.run(&["stream", "bank.json", "--format", "cf32"], &bytes(&input));
-    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
-    assert!(floats(&output.stdout) == want);
+    assert!(floats(&desk.piped(&["stream", "bank.json", "--format", "cf32"], &bytes(&input))) == want);
     // Integers, with clipping of either part counted.
     let coded: Vec<u8> = input.iter().flat_map(|x| ((x * 8.0) as i16).to_be_bytes()).collect();
     desk.write("coded", &coded);

@@ -4,19 +4,14 @@ mod recordings;
 mod turns;
 
 use crate::support::{Desk, TAPS, bytes, fused, interleaved, names, text, wav};
-use serde_json::json;
+use hybank::bank::{Bank, SynthesisFilters};
+use hybank::units::Seconds;
 use std::fs;
-use std::process::Stdio;
 
 /// N = M = 2, m0 = 3.
 fn write_bank(desk: &Desk, name: &str, fast_period: f64, taps: [Vec<f64>; 2]) {
-    let channels = taps.map(|taps| json!({ "delay": 0.0, "taps": taps }));
-    let bank = json!({
-        "format": "hybank-bank", "version": 1, "spec": null, "fast_period": fast_period, "ratio": 2, "latency": 3,
-        "method": "fir", "channels": channels, "state_space": null,
-        "gamma": { "upper": null, "lower": null, "noncausal": null }
-    });
-    desk.write(name, bank.to_string());
+    let bare = Bank::bare(SynthesisFilters::Fir(taps.to_vec()), 2);
+    desk.write_bank(name, &Bank { fast_period: Seconds(fast_period), latency: 3, ..bare });
 }
 
 /// Replaces bank.json by one with all taps times `scale`.
@@ -87,10 +82,7 @@ fn pipes_carry_headers_without_lengths() {
     assert_eq!(output.stdout[output.stdout.len() - data..], file[file.len() - data..]);
     assert_eq!(output.stdout[40..44], [0xFF; 4]);
     // And our own reader takes it, through the identity bank of one channel.
-    let identity = r#"{ "format": "hybank-bank", "version": 1, "spec": null, "fast_period": 1.0, "ratio": 1,
-        "latency": 0, "method": "fir", "channels": [{ "delay": 0.0, "taps": [1.0] }], "state_space": null,
-        "gamma": { "upper": null, "lower": null, "noncausal": null } }"#;
-    desk.write("one.json", identity);
+    desk.write_bank("one.json", &Bank::bare(SynthesisFilters::Fir(vec![vec![1.0]]), 1));
     desk.write("streamed.wav", &output.stdout);
     quietly(&desk, &["fuse", "one.json", "streamed.wav", "-o", "again.wav"]);
     assert_eq!(wav::samples(&desk, "again.wav"), wav::samples(&desk, "file.wav"));
@@ -102,9 +94,7 @@ fn an_interrupt_leaves_nothing_behind() {
     let desk = Desk::new();
     wav::write(&desk, "both.wav", 2, 24_000, &[0.5; 200]);
     let before = names(&desk.path(""));
-    let mut command = desk.command(&["fuse", "bank.json", "-", "-o", "out.wav"]);
-    let mut child =
-        command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut child = desk.spawn(&["fuse", "bank.json", "-", "-o", "out.wav"]);
     let mut stdin = child.stdin.take().unwrap();
     // Less than the header promises, and the pipe stays open: only the signal can end this.
     let wav = desk.read("both.wav");

@@ -1,7 +1,7 @@
 //! Interrupts of commands that compute, which end at once, and of a design, which ends with what it has.
 
 use crate::support::blocked::until_a_thread_begins;
-use crate::support::{Desk, INT, TERM, THESIS, ending_signals, names, send, text};
+use crate::support::{Desk, INT, TERM, THESIS, ending_signals, names, repository, send, text};
 use std::process::{Child, Output};
 use std::time::Duration;
 
@@ -71,7 +71,7 @@ fn a_design_ends_at_the_second_signal_without_a_file() {
 /// The bank has its name before the search for its proof begins.
 #[test]
 fn a_search_for_a_proof_ends_at_the_first_signal_and_leaves_the_bank() {
-    let filters = concat!(env!("CARGO_MANIFEST_DIR"), "/../filters/interleaved-4x250M.toml");
+    let filters = repository("filters/interleaved-4x250M.toml");
     let desk = Desk::with_spec(&std::fs::read_to_string(filters).unwrap());
     let child = desk.spawn(&["design", "spec.toml", "-o", "bank.json", "--prove"]);
     until_a_thread_begins(child.id(), "proof");

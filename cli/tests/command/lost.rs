@@ -1,6 +1,6 @@
 //! Samples that were lost: what tells of them, what stands in for them, what they touch. As a user runs it.
 
-use crate::support::{Desk, bytes, channel, floats, frames, fused, number, text, wav, words};
+use crate::support::{Desk, bytes, channel, floats, frames, fused, interleaved, number, text, wav, words};
 use serde_json::{Value, json};
 use trials::random::Random;
 
@@ -278,6 +278,11 @@ fn follow_levels(desk: &Desk, steady: &[f32]) {
     desk.refused(1, &[&args[..7], &["zero.csv", "--force"]].concat(), &["zero.csv", "gain of channel 2"]);
 }
 
+/// What the samples of a file are against those of the target, away from the ends, dB.
+fn snr_of(desk: &Desk, file: &str) -> f64 {
+    wav::snr_db(&wav::samples(desk, file), &wav::samples(desk, "cap/target.wav"), 500)
+}
+
 /// Clocks that drift by 5 ppm over 2 s: the taps follow the delays of a table, of either kind.
 #[test]
 fn a_table_of_delays_is_followed() {
@@ -290,16 +295,10 @@ fn a_table_of_delays_is_followed() {
         "drift.jsonl",
         "{\"frame\": 0, \"delay\": [0, 1e-5]}\n{\"frame\": 9, \"delay\": [0, null]}\n{\"frame\": 48000, \"delay\": [0, 2e-5]}\n",
     );
-    let want = wav::samples(&desk, "cap/target.wav");
     let snr = |more: &[&str]| {
         let args = ["fuse", "bank.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "y.wav"];
         let report = desk.report(&[&args[..], more].concat());
-        let got = wav::samples(&desk, "y.wav");
-        assert_eq!(got.len(), want.len());
-        let inner = 500..want.len() - 500;
-        let power: f64 = want[inner.clone()].iter().map(|x| f64::from(*x).powi(2)).sum();
-        let error: f64 = inner.map(|n| f64::from(got[n] - want[n]).powi(2)).sum();
-        (10.0 * (power / error).log10(), report)
+        (snr_of(&desk, "y.wav"), report)
     };
     let (fixed, _) = snr(&[]);
     for table in ["delays.csv", "drift.jsonl"] {
@@ -316,25 +315,20 @@ fn a_table_of_delays_is_followed() {
     assert!(report["worst_second_db"].as_f64().unwrap() > 75.0 && report["interrupted"] == false);
     assert_eq!(wav::samples(&desk, "s.wav"), fused);
     let channels = ["cap/ch1.wav", "cap/ch2.wav"].map(|file| wav::samples(&desk, file));
-    let frames = channels[0].iter().zip(&channels[1]);
-    let raw: Vec<u8> = frames.flat_map(|(a, b)| [a.to_le_bytes(), b.to_le_bytes()].concat()).collect();
-    let piped = desk.run(&["stream", "bank.json", "--track", "drift.jsonl"], &raw).stdout;
-    assert!(piped == fused.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>());
+    let raw = bytes(&interleaved(&channels[0], &channels[1]));
+    assert!(desk.run(&["stream", "bank.json", "--track", "drift.jsonl"], &raw).stdout == bytes(&fused));
     desk.refused(2, &["stream", "bank.json", "--track", "drift.jsonl", "--flush"], &["--flush"]);
-    desk.write("one.csv", "time,a\n0,0\n");
     let args = ["fuse", "bank.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "no.wav", "--track"];
-    desk.refused(1, &[&args[..], &["one.csv"]].concat(), &["one.csv", "1 column of delays", "2 channels"]);
     desk.refused(2, &[&args[..], &["delays.csv", "--gaps"]].concat(), &["--gaps"]);
-    desk.write("jump.csv", "time,a,b\n0,0,0\n1,0,1.5\n");
-    desk.refused(1, &[&args[..], &["jump.csv"]].concat(), &["jump.csv", "frame 24000", "channel 2"]);
-    desk.write("none.jsonl", "{\"frame\": 0, \"delay\": [0, null]}\n");
-    desk.refused(1, &[&args[..], &["none.jsonl"]].concat(), &["none.jsonl", "no line with the delays"]);
-    desk.write("bad.jsonl", "{\"frame\": 0, \"delay\": [0]}\n");
-    desk.refused(
-        1,
-        &[&args[..], &["bad.jsonl"]].concat(),
-        &["bad.jsonl", "line 1", "1 delay for 2 channels"],
-    );
+    for (table, content, parts) in [
+        ("one.csv", "time,a\n0,0\n", ["1 column of delays", "2 channels"]),
+        ("jump.csv", "time,a,b\n0,0,0\n1,0,1.5\n", ["frame 24000", "channel 2"]),
+        ("none.jsonl", "{\"frame\": 0, \"delay\": [0, null]}\n", ["none.jsonl", "no line with the delays"]),
+        ("bad.jsonl", "{\"frame\": 0, \"delay\": [0]}\n", ["line 1", "1 delay for 2 channels"]),
+    ] {
+        desk.write(table, content);
+        desk.refused(1, &[&args[..], &[table]].concat(), &[&[table][..], &parts].concat());
+    }
     // Integers cannot hold what is beyond full scale.
     let loud: Vec<f32> = wav::samples(&desk, "cap/ch1.wav").iter().map(|x| 9.0 * x).collect();
     wav::write(&desk, "loud.wav", 1, 24_000, &loud);
@@ -362,7 +356,6 @@ fn what_changes_is_calibrated_and_corrected() {
         let captured = wav::samples(&desk, &format!("cap/ch{}.wav", i + 1));
         wav::write(&desk, file, 1, 24_000, &captured.iter().enumerate().map(moved).collect::<Vec<_>>());
     }
-    let want = wav::samples(&desk, "cap/target.wav");
     let calibrate = |more: &[&str]| {
         let args = ["calibrate", "spec.toml", files[0], files[1], "-o", "m.toml", "--drift", "drift.jsonl"];
         desk.json(&[&args[..], &["--force", "--json"], more].concat())
@@ -370,11 +363,7 @@ fn what_changes_is_calibrated_and_corrected() {
     let snr = |table: &str| {
         let args = ["fuse", "bank.json", files[0], files[1], "-o", "y.wav", "--force", "--track", table];
         desk.good(&args);
-        let got = wav::samples(&desk, "y.wav");
-        let inner = 500..want.len() - 500;
-        let power: f64 = want[inner.clone()].iter().map(|x| f64::from(*x).powi(2)).sum();
-        let error: f64 = inner.map(|n| f64::from(got[n] - want[n]).powi(2)).sum();
-        10.0 * (power / error).log10()
+        snr_of(&desk, "y.wav")
     };
     // Four lines are little for a calibration by any signal.
     for (signal, least) in [(&["--tone", tones][..], 10.0), (&["--blind"], 3.0)] {
@@ -393,20 +382,11 @@ fn what_changes_is_calibrated_and_corrected() {
         println!("{signal:?}: SNR {delays:.1} dB with delays, {all:.1} dB with all");
         assert!(all > delays + least && all > 50.0, "{delays} {all}");
     }
-    let mixed = lines_without_gains(&text(&desk.read("drift.jsonl")));
-    desk.write("mixed.jsonl", mixed);
+    // The same lines, the second without its gains.
+    let lines = text(&desk.read("drift.jsonl"));
+    let mut lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    lines[1].as_object_mut().unwrap().remove("gain");
+    desk.write("mixed.jsonl", lines.iter().map(|line| format!("{line}\n")).collect::<String>());
     let args = ["fuse", "bank.json", files[0], files[1], "-o", "n.wav", "--track", "mixed.jsonl"];
     desk.refused(1, &args, &["mixed.jsonl: line 2", "in all or in none"]);
-}
-
-/// The same lines, the second without its gains.
-fn lines_without_gains(lines: &str) -> String {
-    let line = |(number, line): (usize, &str)| {
-        let mut line: Value = serde_json::from_str(line).unwrap();
-        if number == 1 {
-            line.as_object_mut().unwrap().remove("gain");
-        }
-        line.to_string() + "\n"
-    };
-    lines.lines().enumerate().map(line).collect()
 }

@@ -122,17 +122,13 @@ fn a_recording_is_compared_with_a_reference() {
     assert!(report.contains("lag") && report.contains("SNR, unaligned"), "{report}");
     assert!(fs::read_to_string(desk.path("e.svg")).unwrap().contains("error against clean.wav"));
     wav::write(&desk, "fast.wav", 1, 96_000, &clean);
-    desk.refused(
-        1,
-        &["measure", "late.wav", "--ref", "fast.wav"],
-        &["fast.wav", "96000", "48000", "resample"],
-    );
     wav::write(&desk, "flat.wav", 1, 48_000, &[0.25; 3000]);
-    desk.refused(
-        1,
-        &["measure", "late.wav", "--ref", "flat.wav"],
-        &["late.wav against flat.wav", "constant"],
-    );
+    for (reference, parts) in [
+        ("fast.wav", &["fast.wav", "96000", "48000", "resample"][..]),
+        ("flat.wav", &["late.wav against flat.wav", "constant"]),
+    ] {
+        desk.refused(1, &["measure", "late.wav", "--ref", reference], parts);
+    }
     desk.refused(2, &["measure", "-", "--ref", "-"], &["`-` is given twice"]);
 }
 
@@ -202,16 +198,11 @@ fn fuse_measures_before_and_after() {
     assert!(after > before + 20.0, "{before} {after}");
     let tone = number(&found, "/measure/after/tones/0/frequency_hertz/value");
     assert!((tone - 0.35 / TAU * RATE).abs() < 0.1, "{tone}");
-    desk.refused(
-        2,
-        &["fuse", "b.json", "cap/ch1.wav", "-", "-o", "z.wav", "--measure"],
-        &["--measure", "standard input"],
-    );
-    desk.refused(
-        2,
-        &["fuse", "b.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "-", "--measure"],
-        &["--measure"],
-    );
+    for (input, output, parts) in
+        [("-", "z.wav", &["--measure", "standard input"][..]), ("cap/ch2.wav", "-", &["--measure"])]
+    {
+        desk.refused(2, &["fuse", "b.json", "cap/ch1.wav", input, "-o", output, "--measure"], parts);
+    }
     desk.refused(2, &[&fuse[..6], &["--tone", "9kHz"]].concat(), &["--measure"]);
     // Both over one axis: rings before and discs after, and one line in the legend for each cause.
     assert!(report.lines().any(|line| line.starts_with("worst of these")), "{report}");

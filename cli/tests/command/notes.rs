@@ -55,8 +55,7 @@ fn sigmf_keeps_what_it_is_for() {
     for (args, name, shift, samples) in
         [(&fuse[..], "fused.sigmf-meta", 0, 206), (&live, "live.sigmf-meta", 10, 206)]
     {
-        let output = desk.run(&[args, &inputs].concat(), &[]);
-        assert!(output.status.success(), "{output:?}");
+        desk.warned(&[args, &inputs].concat(), &[]);
         let meta = desk.read_json(name);
         let global = &meta["global"];
         assert_eq!(global["core:author"], "A. Listener");

@@ -1,6 +1,6 @@
 //! Which files a run may write, when they appear, and what becomes of what was there.
 
-use crate::support::{Desk, bytes, channel, frames, fused, names, text};
+use crate::support::{Desk, bytes, channel, frames, fused, names, text, wav};
 use std::fs;
 use std::io::Write;
 use std::os::unix::fs::symlink;
@@ -10,17 +10,8 @@ use std::process::{Child, Command};
 fn desk() -> Desk {
     let desk = Desk::with_model();
     let frames = frames(100);
-    wav(&desk, "a.wav", &channel(&frames, 0));
-    wav(&desk, "b.wav", &channel(&frames, 1));
+    wav::write_pair(&desk, &channel(&frames, 0), &channel(&frames, 1));
     desk
-}
-
-fn wav(desk: &Desk, name: &str, samples: &[f32]) {
-    let (bits_per_sample, sample_format) = (32, hound::SampleFormat::Float);
-    let spec = hound::WavSpec { channels: 1, sample_rate: 24_000, bits_per_sample, sample_format };
-    let mut writer = hound::WavWriter::create(desk.path(name), spec).unwrap();
-    samples.iter().for_each(|&x| writer.write_sample(x).unwrap());
-    writer.finalize().unwrap();
 }
 
 /// `hybank stream`, with more arguments, that has begun its output and waits for the rest of its input.
@@ -126,11 +117,10 @@ fn one_pipe_is_not_read_for_two_channels() {
 fn samples_that_are_dropped_with_the_latency_do_not_count_as_clipped() {
     let desk = Desk::new();
     // The first three output samples, 10, 20 and 30 times 0.2, are before the output's beginning.
-    wav(&desk, "a.wav", &[0.0; 5]);
-    wav(&desk, "b.wav", &[0.2, 0.0, 0.0, 0.0, 0.0]);
+    wav::write_pair(&desk, &[0.0; 5], &[0.2, 0.0, 0.0, 0.0, 0.0]);
     let args = ["fuse", "bank.json", "a.wav", "b.wav", "-o", "out.wav", "--bits", "16", "--strict"];
     assert_eq!(desk.report(&args)["clipped"], 0);
-    wav(&desk, "b.wav", &[0.0, 0.2, 0.0, 0.0, 0.0]);
+    wav::write_pair(&desk, &[0.0; 5], &[0.0, 0.2, 0.0, 0.0, 0.0]);
     let output = desk.run(&[&args[..], &["--force"]].concat(), &[]);
     let message = text(&output.stderr);
     assert!(

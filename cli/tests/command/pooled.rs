@@ -5,26 +5,14 @@ use crate::support::{Desk, number};
 use hybank::spec::Spec;
 use serde_json::Value;
 
-/// Four converters of 750 MS/s in turn.
-const QUAD: &str = r#"fast_rate = "3 GS/s"
-ratio = 4
-full_scale = "8bits"
-[target]
-filter = { family = "butterworth", order = 2, cutoff = "2.2 GHz" }
-[[channel]]
-delay_samples = 3
-[[channel]]
-delay_samples = 2
-[[channel]]
-delay_samples = 1
-[[channel]]
-delay_samples = 0
-[signal]
-band = "1.4 GHz"
-[design]
-method = "fir"
-taps = 64
-"#;
+/// A spec of four converters that sample in turn, with the lines before its tables.
+pub(crate) fn four_converters(head: &str, cutoff: &str, band: &str, taps: usize) -> String {
+    let channels = [3, 2, 1, 0].map(|i| format!("[[channel]]\ndelay_samples = {i}\n")).concat();
+    format!(
+        "{head}\nratio = 4\n[target]\nfilter = {{ family = \"butterworth\", order = 2, cutoff = \"{cutoff}\" }}\n\
+         {channels}[signal]\nband = \"{band}\"\n[design]\nmethod = \"fir\"\ntaps = {taps}\n"
+    )
+}
 
 /// What two units really are: skews, gains and offsets of each converter.
 const UNITS: [[&str; 3]; 2] = [
@@ -87,7 +75,9 @@ fn pooled_captures_of_quad_converters() {
     let (units, alone) = if is_all { (2, 0..9) } else { (1, 0..0) };
     for (unit, errors) in UNITS.into_iter().enumerate().take(units) {
         let desk = Desk::empty();
-        desk.write("quad.toml", QUAD);
+        // Of 750 MS/s each.
+        let head = "fast_rate = \"3 GS/s\"\nfull_scale = \"8bits\"";
+        desk.write("quad.toml", four_converters(head, "2.2 GHz", "1.4 GHz", 64));
         let names: Vec<String> = (0..9).map(|k| format!("z{k}.csv")).collect();
         for (tone, name) in TONES.into_iter().zip(&names) {
             capture(&desk, errors, tone, SHORT, name);

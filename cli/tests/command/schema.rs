@@ -1,8 +1,7 @@
 //! The JSON schemas: every example fits them, and a damaged one does not.
 
-use crate::support::{Desk, THESIS, schema};
+use crate::support::{Desk, THESIS, repository, schema};
 use serde_json::{Value, json};
-use std::path::Path;
 
 fn schema_of(desk: &Desk, kind: &str) -> Value {
     serde_json::from_str(&desk.good(&["schema", kind])).unwrap()
@@ -10,7 +9,7 @@ fn schema_of(desk: &Desk, kind: &str) -> Value {
 
 /// The examples of the repository with an extension.
 fn examples(extension: &str) -> Vec<(String, String)> {
-    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    let root = repository("");
     let folders = ["filters", "examples/calibrate", "examples/recorders"];
     let paths = folders.iter().flat_map(|folder| std::fs::read_dir(root.join(folder)).unwrap());
     let paths = paths.map(|entry| entry.unwrap().path());

@@ -1,23 +1,12 @@
 //! The commands `simulate` and `demo`: virtual captures, fused again and compared with the target.
 
-use crate::support::{Desk, THESIS, number, wav, words};
+use crate::support::{Desk, THESIS, floats, number, wav, words};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
-/// Sample rate and samples.
-pub(crate) fn recording(path: &Path) -> (u32, Vec<f64>) {
-    let (spec, samples) = wav::read(path);
-    (spec.sample_rate, samples.into_iter().map(f64::from).collect())
-}
-
-/// 20 log10 of target over error, over samples `skip` .. end - `skip`.
-fn snr_db(got: &[f64], target: &[f64], skip: usize) -> f64 {
-    assert_eq!(got.len(), target.len());
-    let judged = skip..target.len() - skip;
-    let signal: f64 = judged.clone().map(|n| target[n].powi(2)).sum();
-    let error: f64 = judged.map(|n| (got[n] - target[n]).powi(2)).sum();
-    10.0 * (signal / error).log10()
+pub(crate) fn recording(path: &Path) -> Vec<f64> {
+    wav::read(path).1.into_iter().map(f64::from).collect()
 }
 
 #[test]
@@ -32,17 +21,13 @@ fn every_source_is_captured_and_fused() {
         assert_eq!((&captured["frames"], &captured["latency"]), (&Value::from(200), &Value::from(10)));
         assert_eq!(captured["files"].as_array().unwrap().len(), 3);
         desk.good(&["fuse", "bank.json", "cap/ch1.wav", "cap/ch2.wav", "-o", "y.wav", "--force"]);
-        let ((rate, fused), (_, target)) =
-            (recording(&desk.path("y.wav")), recording(&desk.path("cap/target.wav")));
-        assert_eq!((rate, fused.len()), (48_000, 400));
-        let snr = snr_db(&fused, &target, 60);
+        let (spec, fused) = wav::read(&desk.path("y.wav"));
+        assert_eq!((spec.sample_rate, fused.len()), (48_000, 400));
+        let snr = wav::snr_db(&fused, &wav::samples(&desk, "cap/target.wav"), 60);
         assert!(snr > least, "{source}: {snr:.1} dB");
     }
-    desk.refused(
-        1,
-        &["simulate", "bank.json", "--source", "step@0.3", "-o", "cap"],
-        &["cap/ch1.wav", "file exists", "--force"],
-    );
+    let again = ["simulate", "bank.json", "--source", "step@0.3", "-o", "cap"];
+    desk.refused(1, &again, &["cap/ch1.wav", "file exists", "--force"]);
 }
 
 #[test]
@@ -56,18 +41,11 @@ fn a_recording_is_a_source() {
     assert_eq!(report["frames"], 400);
     // The response of 0.25 / (j w + 0.5)^2 has gain 0.25 / (w^2 + 0.25).
     let (gain, phase) = (0.25 / (omega * omega + 0.25), -2.0 * (omega / 0.5).atan());
-    let (_, samples) = recording(&desk.path("cap/ch1.wav"));
-    for (k, x) in samples.iter().enumerate() {
+    for (k, x) in recording(&desk.path("cap/ch1.wav")).iter().enumerate() {
         let expected = gain * (omega * (2.0 * k as f64 - 1.2) + phase).sin();
         assert!((x - expected).abs() < 1e-6, "{k}: {x} instead of {expected}");
     }
     desk.refused(1, &["simulate", "spec.toml", "--source", "none.wav", "-o", "c2"], &["none.wav"]);
-}
-
-/// Complex numbers of little-endian 32-bit floats.
-fn complex(bytes: &[u8]) -> Vec<[f64; 2]> {
-    let number = |bytes: &[u8]| f64::from(f32::from_le_bytes(bytes.try_into().unwrap()));
-    bytes.chunks_exact(8).map(|sample| [number(&sample[..4]), number(&sample[4..])]).collect()
 }
 
 /// Response of 0.25 / (s + 0.5)^2 to e^{j w t}.
@@ -86,8 +64,9 @@ fn complex_captures_have_their_closed_form_and_fuse_to_the_complex_target() {
     assert_eq!(report["files"][0], "cap/ch1.sigmf-meta");
     assert_eq!(desk.read_json("cap/ch1.sigmf-meta")["global"]["core:datatype"], "cf32_le");
     for (name, delay, period) in [("ch1", 1.2, 2.0), ("ch2", 0.6, 2.0), ("target", 0.0, 1.0)] {
-        let samples = complex(&desk.read(&format!("cap/{name}.sigmf-data")));
-        for (k, [re, im]) in samples.into_iter().enumerate() {
+        let samples = floats(&desk.read(&format!("cap/{name}.sigmf-data")));
+        for (k, sample) in samples.chunks_exact(2).enumerate() {
+            let (re, im) = (f64::from(sample[0]), f64::from(sample[1]));
             let t = k as f64 * period - delay;
             let (a, b) = (exponential(0.3, t), exponential(-0.8, t));
             let far = (re - a[0] - b[0]).hypot(im - a[1] - b[1]);
@@ -96,9 +75,8 @@ fn complex_captures_have_their_closed_form_and_fuse_to_the_complex_target() {
     }
     let fuse = ["fuse", "bank.json", "cap/ch1.sigmf-meta", "cap/ch2.sigmf-meta", "-o", "y.sigmf-meta"];
     desk.good(&fuse);
-    let parts = |bytes: &[u8]| complex(bytes).concat();
-    let (fused, target) = (parts(&desk.read("y.sigmf-data")), parts(&desk.read("cap/target.sigmf-data")));
-    let snr = snr_db(&fused, &target, 120);
+    let parts = |name: &str| floats(&desk.read(name));
+    let snr = wav::snr_db(&parts("y.sigmf-data"), &parts("cap/target.sigmf-data"), 120);
     assert!(snr > 45.0, "{snr:.1} dB");
     // Raw samples are the same numbers.
     desk.report(&[&simulate[..7], &["cap", "--to", "raw"]].concat());
@@ -133,14 +111,14 @@ fn captures_made_elsewhere_are_fused() {
     let at = |name: &str| captures.join(name).to_string_lossy().into_owned();
     desk.good(&["design", &at("spec.toml"), "-o", "bank.json"]);
     desk.good(&["fuse", "bank.json", &at("ch1.wav"), &at("ch2.wav"), "-o", "y.wav", "--keep-latency"]);
-    let (fused, target) = (recording(&desk.path("y.wav")).1, recording(&captures.join("target.wav")).1);
-    let snr = snr_db(&fused, &target, 200);
+    let target = wav::read(&captures.join("target.wav")).1;
+    let snr = wav::snr_db(&wav::samples(&desk, "y.wav"), &target, 200);
     assert!(snr >= 65.0, "{snr:.2} dB");
     let source = speech.to_string_lossy().into_owned();
     desk.good(&["simulate", "bank.json", "--source", &source, "-o", "cap"]);
     // Their target is late by the latency of their bank; the recording is periodic.
     for (name, late) in [("ch1.wav", 0), ("ch2.wav", 0), ("target.wav", 12)] {
-        let (ours, theirs) = (recording(&desk.path("cap").join(name)).1, recording(&captures.join(name)).1);
+        let (ours, theirs) = (recording(&desk.path("cap").join(name)), recording(&captures.join(name)));
         let worst = ours.iter().zip(&theirs[late..]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(worst < 1e-6 && ours.len().abs_diff(theirs.len()) <= 2, "{name}: {worst:e}");
     }

@@ -32,6 +32,11 @@ impl Bench {
         self.0.spawn(&[&["stream", "bank.json"], args].concat())
     }
 
+    /// What a run without a word gives.
+    fn piped(&self, args: &[&str], input: &[u8]) -> Vec<u8> {
+        self.0.piped(&[&["stream", "bank.json"], args].concat(), input)
+    }
+
     fn run(&self, args: &[&str], input: &[u8]) -> Output {
         self.0.run(&[&["stream", "bank.json"], args].concat(), input)
     }
@@ -42,9 +47,7 @@ fn interleaved_floats_are_the_default() {
     let bench = Bench::new();
     for count in [0, 1, 7, 100_000] {
         let input = frames(count);
-        let output = bench.run(&[], &bytes(&input));
-        assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
-        assert!(floats(&output.stdout) == fused(&input), "{count} frames");
+        assert!(floats(&bench.piped(&[], &bytes(&input))) == fused(&input), "{count} frames");
     }
 }
 
@@ -95,25 +98,15 @@ fn one_fifo_a_channel_in_any_order_of_opening() {
 fn wav_goes_through_with_its_rate() {
     let bench = Bench::new();
     let input = frames(300);
-    let spec = hound::WavSpec {
-        channels: 2,
-        sample_rate: 24_000,
-        bits_per_sample: 32,
-        sample_format: hound::SampleFormat::Float,
-    };
-    let mut wav = std::io::Cursor::new(Vec::new());
-    let mut writer = hound::WavWriter::new(&mut wav, spec).unwrap();
-    input.iter().for_each(|&x| writer.write_sample(x).unwrap());
-    writer.finalize().unwrap();
-    let raw = bench.run(&[], wav.get_ref());
+    crate::support::wav::write(&bench.0, "in.wav", 2, 24_000, &input);
+    let wav = bench.0.read("in.wav");
+    let raw = bench.run(&[], &wav);
     assert!(!raw.status.success() && text(&raw.stderr).contains("give the format wav"), "{raw:?}");
-    let output = bench.run(&["--format", "wav"], wav.get_ref());
-    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
-    assert_eq!((&output.stdout[..4], &output.stdout[24..28]), (&b"RIFF"[..], &48_000u32.to_le_bytes()[..]));
-    assert_eq!(floats(&output.stdout[44..]), fused(&input));
+    let output = bench.piped(&["--format", "wav"], &wav);
+    assert_eq!((&output[..4], &output[24..28]), (&b"RIFF"[..], &48_000u32.to_le_bytes()[..]));
+    assert_eq!(floats(&output[44..]), fused(&input));
     // A file knows its length.
-    let output = bench.run(&["--format", "wav", "-o", "out.wav"], wav.get_ref());
-    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    bench.piped(&["--format", "wav", "-o", "out.wav"], &wav);
     let mut file = hound::WavReader::open(bench.path("out.wav")).unwrap();
     assert_eq!((file.spec().sample_rate, file.duration()), (48_000, 600));
     assert!(file.samples::<f32>().map(Result::unwrap).eq(fused(&input)));
@@ -252,8 +245,7 @@ fn the_name_of_the_output_implies_wav() {
     let bench = Bench::new();
     let frames: Vec<f32> = frames(50);
     for (name, how) in [("y.wav", &[][..]), ("z.WAV", &["--output-format", "wav"])] {
-        let output = bench.run(&[&["-o", name], how].concat(), &bytes(&frames));
-        assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+        bench.piped(&[&["-o", name], how].concat(), &bytes(&frames));
         assert_eq!(crate::support::wav::read(&bench.path(name)).1, fused(&frames), "{name}");
     }
     let output = bench.run(&["-o", "x.wav", "--output-format", "f32le"], &bytes(&frames));
@@ -277,10 +269,9 @@ fn inputs_have_several_channels_each() {
     desk.write("left.raw", bytes(&pair(0)));
     desk.write("right.raw", bytes(&pair(2)));
     let stream = ["stream", "b.json", "--input", "left.raw", "--input", "right.raw"];
-    let output = desk.run(&[&stream[..], &["--channels", "2"]].concat(), b"");
-    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
-    assert_eq!(output.stdout, desk.run(&["stream", "b.json"], &bytes(&samples)).stdout);
-    assert!(output.stdout.len() == 4 * 400);
+    let output = desk.piped(&[&stream[..], &["--channels", "2"]].concat(), b"");
+    assert_eq!(output, desk.piped(&["stream", "b.json"], &bytes(&samples)));
+    assert!(output.len() == 4 * 400);
     desk.refused(2, &stream, &["given 2 times", "4 channels", "--channels how many each input holds"]);
     desk.refused(1, &[&stream[..], &["--channels", "3"]].concat(), &["4 channels"]);
     let wav = ["stream", "b.json", "--format", "wav", "--channels", "2"];

@@ -153,13 +153,8 @@ fn a_measured_front_end_is_modelled() {
     let family = "{ family = \"butterworth\", order = 4, cutoff = 9000.0 }";
     let measured = AUDIO.replace(family, "{ response = \"bode.csv\", order = 4 }");
     desk.write("sub/spec.toml", &measured);
-    let output = desk.run(&["design", "--prove", "sub/spec.toml", "-o", "b.json"], &[]);
-    let echo = text(&output.stderr);
-    assert!(
-        output.status.success() && echo.contains("bode.csv: 4 poles fitted to 120 frequencies"),
-        "{echo}"
-    );
-    assert!(echo.contains("300 Hz to 36 kHz; error at most"), "{echo}");
+    let parts = ["bode.csv: 4 poles fitted to 120 frequencies", "300 Hz to 36 kHz; error at most"];
+    desk.warned(&["design", "--prove", "sub/spec.toml", "-o", "b.json"], &parts);
     let bank = desk.read_json("b.json");
     let gamma = |value: f64, other: f64| (value / other - 1.0).abs();
     assert!(gamma(number(&bank, "/gamma/norm"), number(&exact, "/gamma/norm")) < 1e-6, "{bank}");
@@ -204,5 +199,5 @@ fn the_error_of_a_model_is_carried_into_the_uncertainty() {
     assert_eq!(output.status.code(), Some(1), "{output:?}");
     assert!(text(&output.stderr).contains("./late.csv: it is also the input"), "{output:?}");
     assert_eq!(desk.read("late.csv"), before);
-    assert!(desk.run(&["design", "late.toml", "-o", "late.json"], &[]).status.success());
+    desk.warned(&["design", "late.toml", "-o", "late.json"], &[]);
 }

@@ -5,7 +5,7 @@
 //! `HYBANK_CAMPAIGN=50` makes 50 times as many.
 
 use crate::support::random::Random;
-use crate::support::{Desk, THESIS};
+use crate::support::{Desk, THESIS, repository};
 use hybank::bank::{Bank, check_digest};
 use hybank::design::{DesignOptions, design, prove};
 use hybank::spec::Spec;
@@ -13,7 +13,7 @@ use hybank::verify::verify;
 use serde_json::Value;
 use std::fs;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The thesis example with little latency and few taps.
 fn hurried() -> String {
@@ -35,7 +35,7 @@ fn designed(method: &str) -> Bank {
 fn files() -> Vec<(String, String)> {
     let made =
         ["fir", "iir", "reduced"].map(|method| (method.to_owned(), designed(method).to_json().unwrap()));
-    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("filters");
+    let folder = repository("filters");
     let mut ready: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     ready.retain(|path| path.extension().is_some_and(|extension| extension == "json"));
     ready.sort();

@@ -2,6 +2,7 @@
 //! panics. The seeds are those of the fuzz targets, the damage is the same in every run.
 
 use crate::support::random::Random;
+use crate::support::repository;
 use hybank::analog::fit::{MeasuredResponse, vector_fit};
 use hybank::bank::Bank;
 use hybank::interchange::{taps_of_csv, taps_of_npy};
@@ -12,7 +13,6 @@ use hybank::messages::shown;
 use hybank::spec::Spec;
 use std::fs;
 use std::io::{Cursor, Read};
-use std::path::Path;
 use trials::rounds;
 
 /// Damaged copies of each seed.
@@ -40,7 +40,7 @@ fn fault(dice: &mut Random, bytes: &mut Vec<u8>) {
 
 /// Damaged copies of all seeds of a fuzz target.
 fn damaged(target: &str, mut check: impl FnMut(&[u8])) {
-    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join("fuzz/seeds").join(target);
+    let folder = repository("fuzz/seeds").join(target);
     let mut seeds: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     seeds.sort();
     assert!(!seeds.is_empty());

@@ -1,6 +1,7 @@
 //! A folder in which the program works as a user runs it.
 
 use super::text;
+use hybank::bank::Bank;
 use serde_json::Value;
 use std::fs;
 use std::io::Write;
@@ -55,6 +56,10 @@ impl Desk {
 
     pub(crate) fn write(&self, name: &str, content: impl AsRef<[u8]>) {
         fs::write(self.path(name), content).unwrap();
+    }
+
+    pub(crate) fn write_bank(&self, name: &str, bank: &Bank) {
+        self.write(name, bank.to_json().unwrap());
     }
 
     pub(crate) fn read(&self, name: &str) -> Vec<u8> {
@@ -114,6 +119,21 @@ impl Desk {
         let output = self.run(&[args, &["--json", "--force"]].concat(), &[]);
         assert!(output.status.success(), "{args:?}: {output:?}");
         serde_json::from_slice(&output.stdout).unwrap()
+    }
+
+    /// Runs and wants success with nothing on standard error; gives standard output.
+    pub(crate) fn piped(&self, args: &[&str], input: &[u8]) -> Vec<u8> {
+        let output = self.run(args, input);
+        assert!(output.status.success() && output.stderr.is_empty(), "{args:?}: {output:?}");
+        output.stdout
+    }
+
+    /// Runs and wants success with all of `parts` on standard error, which it gives.
+    pub(crate) fn warned(&self, args: &[&str], parts: &[&str]) -> String {
+        let output = self.run(args, &[]);
+        let said = text(&output.stderr);
+        assert!(output.status.success() && parts.iter().all(|part| said.contains(part)), "{args:?}: {said}");
+        said
     }
 
     /// Runs and wants exit code `code`, nothing on standard output, one message that has all of `parts`, and

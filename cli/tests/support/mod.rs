@@ -7,13 +7,14 @@ mod desk;
 pub(crate) mod forgery;
 pub(crate) use trials::random;
 pub(crate) mod schema;
-#[path = "../../../tests/support/specs.rs"]
-pub(crate) mod specs;
 pub(crate) mod sweep;
 pub(crate) mod wav;
 
 pub(crate) use desk::{Desk, names};
 
+use hybank::bank::{Bank, SynthesisFilters};
+use hybank::spec::Spec;
+use hybank::units::Seconds;
 use serde_json::Value;
 
 /// The thesis example as an FIR bank.
@@ -34,6 +35,20 @@ taps = 22
 
 /// N = M = 2, m0 = 3.
 pub(crate) const TAPS: [&[f32]; 2] = [&[1.0, 2.0, 3.0, 4.0], &[10.0, 20.0, 30.0, 0.0]];
+
+/// A bank of these taps for h = 1 after Butterworth filters of order 2, each channel with its delay.
+pub(crate) fn modelled(taps: Vec<Vec<f64>>, delays: &[f64], ratio: usize, latency: usize) -> Bank {
+    let channels: Vec<String> = delays.iter().map(|delay| format!("{{ delay = {delay} }}")).collect();
+    let text = format!(
+        "fast_period = 1.0\nratio = {ratio}\nlatency = {latency}\nchannel = [{}]\n\
+         target.filter = {{ family = \"butterworth\", order = 2, cutoff = 0.4 }}\ndesign.taps = {}\n",
+        channels.join(", "),
+        taps[0].len()
+    );
+    let spec = Some(Spec::from_toml(&text, "spec.toml").unwrap());
+    let delays = delays.iter().copied().map(Seconds).collect();
+    Bank { spec, latency, delays, ..Bank::bare(SynthesisFilters::Fir(taps), ratio) }
+}
 
 /// The signals of Ctrl-C, of supervisors, of terminals that go, and of Ctrl-\\.
 pub(crate) const INT: u32 = 2;
@@ -70,6 +85,11 @@ fn signals_of(process: &str, key: &str) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let mask = status.lines().find_map(|line| line.strip_prefix(key))?;
     u64::from_str_radix(mask.trim(), 16).ok()
+}
+
+/// A file or folder of the repository.
+pub(crate) fn repository(path: &str) -> std::path::PathBuf {
+    std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/..")).join(path)
 }
 
 /// The words of a command line.

@@ -14,21 +14,13 @@ fn spec() -> Spec {
 }
 
 fn fir() -> Bank {
+    let taps = vec![vec![0.1, -2.5e-9, 1.0 / 3.0], vec![5e-324, -0.0, 1.7e149]];
     Bank {
         spec: Some(spec()),
-        fast_period: Seconds(1.0),
-        ratio: 2,
         latency: 10,
-        method: Method::Fir,
-        samples: vec![1; 2],
         delays: vec![Seconds(1.2), Seconds(0.6)],
-        gains: vec![1.0; 2],
-        offsets: vec![0.0; 2],
-        nonlinearity: vec![Nonlinearity::default(); 2],
-        filters: SynthesisFilters::Fir(vec![vec![0.1, -2.5e-9, 1.0 / 3.0], vec![5e-324, -0.0, 1.7e149]]),
         gamma: Gamma { upper: Some(0.0399320), noncausal: Some(0.03), ..Gamma::default() },
-        proof: None,
-        fixed_point: None,
+        ..Bank::bare(SynthesisFilters::Fir(taps), 2)
     }
 }
 

@@ -49,7 +49,7 @@ pub use signal::{Band, ROUNDING_16_BITS, SignalSpec, SignalSpectrum, USUAL_RMS};
 pub use sizes::{MAX_ERROR_STATES, MAX_FRONT_END_STATES};
 pub(crate) use table::FromTable;
 pub(crate) use tables::SpecTable;
-pub use uncertainty::{ChannelCount, HALF_WIDTH, UncertaintySpec, check_delay_half_width, for_channels};
+pub use uncertainty::{HALF_WIDTH, UncertaintySpec, check_delay_half_width, for_channels};
 pub(crate) use word_lengths::check_fraction_bits;
 pub use word_lengths::{MAX_BITS, MAX_FRACTION_BITS, WordLengths};
 

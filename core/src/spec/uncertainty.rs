@@ -42,26 +42,19 @@ pub struct UncertaintySpec {
     pub reference: Option<usize>,
 }
 
-/// A list that has neither one value nor one per channel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("{given} values are given for {channels} channels; give one for each, or one for all")]
-pub struct ChannelCount {
-    /// Values of the list.
-    pub given: usize,
-    /// Channels.
-    pub channels: usize,
-}
-
 /// One value per channel, of one for all or of a list; zeros where none is given.
 ///
 /// # Errors
-/// [`ChannelCount`] for a list of another length.
-pub fn for_channels<T: Copy + Default>(given: &[T], channels: usize) -> Result<Vec<T>, ChannelCount> {
+/// [`SpecProblem::Value`] for a list of another length.
+pub fn for_channels<T: Copy + Default>(given: &[T], channels: usize) -> Result<Vec<T>, SpecProblem> {
+    let remedy = "give one for each, or one for all";
     match given {
         [] => Ok(vec![T::default(); channels]),
         [all] => Ok(vec![*all; channels]),
         _ if given.len() == channels => Ok(given.to_vec()),
-        _ => Err(ChannelCount { given: given.len(), channels }),
+        _ => Err(SpecProblem::Value {
+            message: format!("{} values are given for {channels} channels; {remedy}", given.len()),
+        }),
     }
 }
 
@@ -100,22 +93,6 @@ impl UncertaintySpec {
     /// Whether a delay or a gain is uncertain.
     pub(super) fn has_delays_or_gains(&self, channels: usize) -> bool {
         self.has_delays(channels) || self.gains(channels).iter().any(|gain| *gain > 0.0)
-    }
-
-    /// Standard deviations of all `channels` delays: a half-width of a 95 % interval of the normal law is
-    /// 1.96 of them.
-    pub fn delay_deviations(&self, channels: usize) -> Vec<Seconds> {
-        self.delays(channels).into_iter().map(|half| half * (1.0 / HALF_WIDTH)).collect()
-    }
-
-    /// Standard deviations of all `channels` offsets.
-    pub fn offset_deviations(&self, channels: usize) -> Vec<f64> {
-        self.offsets(channels).into_iter().map(|half| half / HALF_WIDTH).collect()
-    }
-
-    /// Standard deviations of all `channels` gains.
-    pub fn gain_deviations(&self, channels: usize) -> Vec<f64> {
-        self.gains(channels).into_iter().map(|half| half / HALF_WIDTH).collect()
     }
 
     fn relative<T: Copy + Default>(&self, written: Option<&OneOrEach<T>>, channels: usize) -> Vec<T> {

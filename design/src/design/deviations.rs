@@ -1,6 +1,6 @@
 //! How well each converter is known.
 
-use hybank_core::spec::Spec;
+use hybank_core::spec::{HALF_WIDTH, Spec};
 use hybank_core::units::FastPeriods;
 
 /// Standard deviations of the errors of a converter, which are Gaussian and constant while a recording
@@ -15,14 +15,15 @@ pub(crate) struct Deviations {
 }
 
 impl Deviations {
-    /// Of the converters of a spec, by its `[uncertainty]`.
+    /// Of the converters of a spec, by its `[uncertainty]`: a half-width of a 95 % interval of the normal
+    /// law is 1.96 of them.
     pub(crate) fn of_spec(spec: &Spec) -> Vec<Self> {
         let (table, count) = (spec.uncertainty.clone().unwrap_or_default(), spec.channels.len());
-        let (delays, gains) = (table.delay_deviations(count), table.gain_deviations(count));
-        let offsets = table.offset_deviations(count);
-        let of = |i: usize| {
-            let delay = delays[i].in_fast_periods(spec.fast_period);
-            Self { delay, gain: gains[i], offset: offsets[i] }
+        let (delays, gains, offsets) = (table.delays(count), table.gains(count), table.offsets(count));
+        let of = |i: usize| Self {
+            delay: (delays[i] * (1.0 / HALF_WIDTH)).in_fast_periods(spec.fast_period),
+            gain: gains[i] / HALF_WIDTH,
+            offset: offsets[i] / HALF_WIDTH,
         };
         (0..count).map(of).collect()
     }

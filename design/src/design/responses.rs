@@ -124,6 +124,7 @@ pub fn error_response(bank: &Bank, points: usize) -> Result<Vec<(Hertz, f64)>, D
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tests::designed;
     use hybank_core::bank::StateMatrices;
     use std::f64::consts::TAU;
 
@@ -134,7 +135,7 @@ mod tests {
              channel = [{ delay = 0.6, gain = -2.0 }, { delay = 0.1 }]\n\
              target = { filter = { num = [1.0], den = [1.0, 2.0, 1.0] } }\ndesign = { method = \"sinc\", taps = 4 }";
         let spec = hybank_core::spec::Spec::from_toml(text, "spec.toml").unwrap();
-        let bank = crate::design::design(&spec, &crate::design::DesignOptions::without_proof()).unwrap().bank;
+        let bank = designed(&spec).bank;
         let frequencies = [0.0, 0.25, 0.5, 0.75, 1.0].map(Hertz);
         for (hertz, gains) in frequencies.iter().zip(analysis_gains(&bank, &frequencies).unwrap()) {
             // h = 0.5: 1 / (s + 1)^2 is 0.25 / (s + 0.5)^2 in fast periods.

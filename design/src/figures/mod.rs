@@ -31,8 +31,6 @@ mod reconstruction;
 mod setup;
 mod snr;
 mod spline;
-#[cfg(test)]
-mod tests;
 mod usual_ways;
 
 pub use crate::design::{BandSource, FigureBand, ToneOutput};
@@ -224,3 +222,6 @@ fn any_input(bank: &Bank, spec: &Spec, plain: &Problem) -> Result<Option<f64>, D
         None => Ok(None),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -6,7 +6,8 @@ use super::reconstruction::Reconstruction;
 use super::snr::Ratios;
 use super::*;
 use crate::design::filters::FilterResponse;
-use crate::design::{DesignOptions, SampledSignal, analyze_mean, design, filters};
+use crate::design::{SampledSignal, analyze_mean, filters};
+use crate::tests::designed;
 use hybank_core::bank::SynthesisFilters;
 use hybank_core::units::{FastPeriods, RadiansPerFastPeriod};
 use hybank_linalg::Mat;
@@ -44,7 +45,7 @@ impl System {
     }
 
     fn bank(&self, design: &str) -> Bank {
-        crate::design::design(&self.spec(design), &DesignOptions::without_proof()).unwrap().bank
+        designed(&self.spec(design)).bank
     }
 }
 
@@ -426,8 +427,7 @@ fn check_prediction(seed: u64) {
         let delay = ratio as f64 * (i as f64 + 0.6 * random.part()) / channels as f64;
         let _ = write!(text, "[[channel]]\ndelay = {delay}\ngain = {}\n", 1.0 + 0.1 * random.sample());
     }
-    let bank =
-        design(&Spec::from_toml(&text, "spec.toml").unwrap(), &DesignOptions::without_proof()).unwrap().bank;
+    let bank = designed(&Spec::from_toml(&text, "spec.toml").unwrap()).bank;
     let figures = Figures::new(&bank).unwrap();
     let SynthesisFilters::Fir(taps) = &bank.filters else { panic!("FIR") };
     let plain = without_signal(bank.spec.as_ref().unwrap(), bank.latency).unwrap();

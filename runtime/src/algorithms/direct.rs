@@ -7,9 +7,6 @@
 //! NaN and infinity are detected in the output sums, not by a pass over the input. Frames of a block whose
 //! windows hold them are filtered again with zeros in their place: each frame is filtered at most twice.
 
-#[cfg(test)]
-mod tests;
-
 use super::filter::{AlgorithmFacts, Filter, check_finite, phase_taps};
 use crate::adapters::{FrameSink, FrameSource};
 use crate::aligned::Aligned;
@@ -297,3 +294,6 @@ fn coefficient(taps: &[Vec<f64>], ratio: usize, element: usize, phase: usize) ->
     let (lag, channel) = (element / n, n - 1 - element % n);
     taps[channel].get(phase + lag * ratio).copied().unwrap_or(0.0)
 }
+
+#[cfg(test)]
+mod tests;

@@ -26,11 +26,12 @@ fn check_cuts(stream: &mut Stream, input: &[f32], lost: &[usize], cuts: &[usize]
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(96) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(192) })]
 
+    /// With one tap per phase there is no history at all.
     #[test]
     fn cuts_do_not_change_a_bit(
-        n in 1usize..10, m in 1usize..10, count in 1usize..60, seed: u64,
+        n in 1usize..10, m in 1usize..10, count in prop_oneof![Just(0), 1usize..60], seed: u64,
         cuts in prop::collection::vec(prop_oneof![0usize..20, 0usize..1200], 1..16), double: bool,
         lost in prop::collection::vec(0usize..100_000, 0..4),
     ) {
@@ -41,22 +42,6 @@ proptest! {
         let precision = if double { Precision::Double } else { Precision::Single };
         for algorithm in FIR_ALGORITHMS {
             check_cuts(&mut start(&bank, precise(algorithm, precision)).unwrap(), &input, &lost, &cuts);
-        }
-    }
-
-    /// One tap per phase: no history at all.
-    #[test]
-    fn cuts_do_not_change_a_bit_of_filters_without_history(
-        n in 1usize..10, m in 1usize..10, seed: u64,
-        cuts in prop::collection::vec(prop_oneof![0usize..20, 0usize..900], 1..16),
-        lost in prop::collection::vec(0usize..100_000, 0..4),
-    ) {
-        let mut noise = Noise(seed);
-        let bank = fir_bank(random_taps(n, m, &mut noise), m);
-        let input = noise.samples(n * cuts.iter().sum::<usize>());
-        for algorithm in FIR_ALGORITHMS {
-            let mut stream = start(&bank, precise(algorithm, Precision::Single)).unwrap();
-            check_cuts(&mut stream, &input, &lost, &cuts);
         }
     }
 }

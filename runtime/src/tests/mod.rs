@@ -8,6 +8,7 @@ mod offsets;
 mod pcm;
 mod resets;
 mod response;
+mod small_calls;
 pub(crate) mod support;
 #[cfg(feature = "rayon")]
 mod threads;

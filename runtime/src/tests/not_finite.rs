@@ -1,7 +1,18 @@
 //! NaN, infinity and sums that overflow: replaced, counted and never passed on.
 
-use super::support::{Filters, Noise, fir_bank, random_taps, rotation_bank, run, start};
+use super::support::{Bank, Filters, Noise, fir_bank, random_taps, rotation_bank, run, start};
 use crate::{Options, PcmFormat, PcmFrames, PcmOutput, SampleLayout};
+
+/// The outputs of calls of at most so many frames, and the count of samples that were replaced.
+fn counted(bank: &Bank, input: &[f32], call: usize) -> (Vec<f32>, u64) {
+    let mut stream = start(bank, Options::default()).unwrap();
+    let (n, m) = (stream.channels(), stream.ratio());
+    let mut out = vec![0.0; input.len() / n * m];
+    for (x, y) in input.chunks(call * n).zip(out.chunks_mut(call * m)) {
+        stream.process(x, y).unwrap();
+    }
+    (out, stream.replaced())
+}
 
 #[test]
 fn samples_that_are_not_finite_do_not_spread_in_long_calls() {
@@ -13,10 +24,7 @@ fn samples_that_are_not_finite_do_not_spread_in_long_calls() {
         indices.iter().for_each(|&index| input[index] = 0.0);
         let want = run(&fir_bank(taps.clone(), m), Options::default(), &input);
         indices.iter().for_each(|&index| input[index] = f32::INFINITY);
-        let mut stream = start(&fir_bank(taps, m), Options::default()).unwrap();
-        let mut out = vec![0.0; want.len()];
-        stream.process(&input, &mut out).unwrap();
-        assert_eq!((out, stream.replaced()), (want, 4), "N {n} M {m}");
+        assert_eq!(counted(&fir_bank(taps, m), &input, 9000), (want, 4), "N {n} M {m}");
     }
 }
 
@@ -35,16 +43,8 @@ fn what_is_not_finite_is_found_wherever_it_is() {
             let want = run(&bank, Options::default(), &input);
             input[index] = if lags % 2 == 0 { f32::NAN } else { f32::NEG_INFINITY };
             for call in [420, 60, 7] {
-                let mut stream = start(&bank, Options::default()).unwrap();
-                let mut out = vec![0.0; want.len()];
-                for (x, y) in input.chunks(call * n).zip(out.chunks_mut(call * m)) {
-                    stream.process(x, y).unwrap();
-                }
-                assert_eq!(
-                    (&out, stream.replaced()),
-                    (&want, 1),
-                    "N {n} M {m} K {lags}, sample {index}, {call}"
-                );
+                let (out, replaced) = counted(&bank, &input, call);
+                assert_eq!((&out, replaced), (&want, 1), "N {n} M {m} K {lags}, sample {index}, {call}");
             }
         }
     }
@@ -94,14 +94,10 @@ fn what_is_not_finite_is_zero_at_any_distance() {
         }
         let count = input.iter().filter(|x| !x.is_finite()).count() as u64;
         for call in [5000, 2111, 700, 64, 17] {
-            let mut stream = start(&bank, Options::default()).unwrap();
-            let mut out = vec![0.0; want.len()];
-            for (x, y) in input.chunks(call * n).zip(out.chunks_mut(call * m)) {
-                stream.process(x, y).unwrap();
-            }
+            let (out, replaced) = counted(&bank, &input, call);
             let different = out.iter().zip(&want).position(|(a, b)| a.to_bits() != b.to_bits());
             let case = format!("N {n} M {m} K {lags}, up to {most} frames apart, calls of {call} frames");
-            assert_eq!((different, stream.replaced()), (None, count), "{case}");
+            assert_eq!((different, replaced), (None, count), "{case}");
         }
     }
 }

@@ -40,7 +40,7 @@ fn plans(channels: usize, ratio: usize, noise: &mut Noise) -> Vec<[Plan; 2]> {
         .flat_map(|(bank, way)| [Precision::Single, Precision::Double].map(|p| (bank, precise(way, p))))
         .map(|(bank, options)| {
             let plain = bank.plan(options).unwrap();
-            [plain.clone(), plain.with_offsets(&offsets(channels)).unwrap()]
+            [plain.clone(), plain.with_corrections(&offsets(channels), &[]).unwrap()]
         })
         .collect()
 }
@@ -130,7 +130,7 @@ fn offsets_are_subtracted_on_all_threads() {
     let bank = fir_bank(random_taps(2, 1024, &mut noise), 2);
     let x = noise.samples(2 * 40_000);
     let pool = crate::ThreadPool::new(3).unwrap();
-    let plan = bank.plan(Options::default()).unwrap().with_offsets(&[0.3, -0.01]).unwrap();
+    let plan = bank.plan(Options::default()).unwrap().with_corrections(&[0.3, -0.01], &[]).unwrap();
     let [mut alone, mut together] = [vec![0f32; 80_000], vec![0f32; 80_000]];
     Stream::new(&plan).process(&x, &mut alone).unwrap();
     let frames = crate::Interleaved::new(&x, 2).unwrap();
@@ -159,13 +159,13 @@ fn a_sample_that_is_not_finite_is_zero_after_the_subtraction() {
 #[test]
 fn offsets_that_do_not_fit_are_refused() {
     let plan = || Plan::from_taps(&[vec![1.0], vec![1.0]], 1, 0, Options::default()).unwrap();
-    let refused = plan().with_offsets(&[0.5]).unwrap_err();
+    let refused = plan().with_corrections(&[0.5], &[]).unwrap_err();
     assert_eq!(refused, BuildError::OffsetCount { offsets: 1, channels: 2 });
     for value in [f64::NAN, f64::INFINITY, 1e39] {
-        let refused = plan().with_offsets(&[0.0, value]).unwrap_err();
+        let refused = plan().with_corrections(&[0.0, value], &[]).unwrap_err();
         assert!(matches!(refused, BuildError::NotFinite { index: 1, .. }), "{refused}");
     }
-    assert!(plan().with_offsets(&[0.0, -0.0]).unwrap().corrections().is_none());
+    assert!(plan().with_corrections(&[0.0, -0.0], &[]).unwrap().corrections().is_none());
 }
 
 /// By the definition of Chebyshev's polynomials, cos(k acos x), in both number types.

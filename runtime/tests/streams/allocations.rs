@@ -20,7 +20,7 @@ fn plans() -> Vec<Plan> {
     let plain: Vec<Plan> = plans(N).chain(plans(1)).collect();
     let subtracting = plain.iter().map(|plan| {
         let offsets = [0.25, -0.5];
-        plan.clone().with_offsets(&offsets[..plan.channels()]).unwrap()
+        plan.clone().with_corrections(&offsets[..plan.channels()], &[]).unwrap()
     });
     plain.iter().cloned().chain(subtracting).collect()
 }

@@ -2,5 +2,4 @@
 
 mod allocations;
 mod in_place;
-mod small_calls;
 mod states;

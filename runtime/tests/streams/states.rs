@@ -53,7 +53,7 @@ fn plans() -> Vec<Plan> {
         }
     }
     plans.extend([(1, 2), (2, 2), (2, 5)].map(|(n, order)| recursion(n, order)));
-    let offset = plans[3].clone().with_offsets(&[0.25]).unwrap();
+    let offset = plans[3].clone().with_corrections(&[0.25], &[]).unwrap();
     plans.push(offset);
     plans
 }

@@ -23,8 +23,6 @@
 mod likelihood;
 mod single;
 mod spectra;
-#[cfg(test)]
-mod tests;
 
 use super::CalibrationSettings;
 use super::error::CalibrateError;
@@ -347,3 +345,6 @@ impl Maximum<'_> {
             .then_some(CalibrationWarning::OffsetsHidden { half_width, noise: HALF_WIDTH * of_noise })
     }
 }
+
+#[cfg(test)]
+mod tests;

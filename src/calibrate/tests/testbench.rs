@@ -9,10 +9,9 @@ use std::f64::consts::TAU;
 
 /// Four interleaved converters with M = 4 at 1 MHz, after a first-order low-pass of 2 MHz.
 pub(super) fn interleaved() -> Spec {
-    let text = "fast_rate = 1e6\nratio = 4\nlatency = 8\n[target]\nfilter = { family = \"rc\", cutoff = 2e6 }\n\
-                channel = []\n";
-    let channels: String = (0..4).map(|i| format!("[[channel]]\ndelay_samples = {i}\n")).collect();
-    Spec::from_toml(&(text.replace("channel = []\n", "") + &channels), "spec.toml").unwrap()
+    let text = "fast_rate = 1e6\nratio = 4\nlatency = 8\ntarget = { filter = { family = \"rc\", cutoff = 2e6 } }\n\
+                channel = [{ delay_samples = 0 }, { delay_samples = 1 }, { delay_samples = 2 }, { delay_samples = 3 }]";
+    Spec::from_toml(text, "spec.toml").unwrap()
 }
 
 /// `spec` with other delays (fast periods are added), gains (factors), offsets and cut-offs (factors).
@@ -102,9 +101,9 @@ fn waves(truth: &Spec, frequencies: &[Hertz], phases: &[f64], frames: usize) -> 
     truth.channels.iter().map(channel).collect()
 }
 
-/// A Gaussian number of unit variance (Box and Muller, 1958).
+/// As [`Random::gaussian`].
 pub(crate) fn gaussian(dice: &mut Random) -> f64 {
-    (-2.0 * (1.0 - dice.part()).ln()).sqrt() * (TAU * dice.part()).cos()
+    dice.gaussian()
 }
 
 /// Errors of the fitted values of the channels other than the reference over their standard deviations, and

@@ -17,8 +17,6 @@ mod interference;
 mod phasors;
 mod ratios;
 mod solution;
-#[cfg(test)]
-mod tests;
 
 use super::CalibrationSettings;
 use super::error::CalibrateError;
@@ -337,3 +335,6 @@ fn check_order(model: &ChannelModel, tones: &[TonePhasors], reference: usize) ->
     };
     other_order(&distances, reference).map_or(Ok(()), |order| Err(CalibrateError::WrongOrder { order }))
 }
+
+#[cfg(test)]
+mod tests;

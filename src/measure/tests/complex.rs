@@ -16,20 +16,14 @@ const IDEAL: Mixer = Mixer { offset: Complex::new(0.0, 0.0), gain: 1.0, phase: 0
 impl Mixer {
     fn record(&self, count: usize, tone: impl Fn(usize) -> Complex<f64>) -> [Vec<f64>; 2] {
         let mut random = Random(7);
-        let mut noise = |x: f64| x + self.noise * gaussian(&mut random);
+        let mut noise = |x: f64| x + self.noise * random.gaussian();
         let (sin, cos) = self.phase.sin_cos();
         let part = |n: usize| {
             let z = tone(n);
             (z.re + self.offset.re, self.gain * (z.im * cos + z.re * sin) + self.offset.im)
         };
-        (0..count).map(part).map(|(x, y)| (noise(x), noise(y))).fold(
-            [vec![], vec![]],
-            |[mut xs, mut ys], (x, y)| {
-                xs.push(x);
-                ys.push(y);
-                [xs, ys]
-            },
-        )
+        let (xs, ys) = (0..count).map(part).map(|(x, y)| (noise(x), noise(y))).unzip();
+        [xs, ys]
     }
 }
 

@@ -20,12 +20,12 @@ fn quantised(samples: &[f64], bits: i32) -> Vec<f64> {
     samples.iter().map(|x| ((x / step - 0.5).round() + 0.5) * step).collect()
 }
 
-fn gaussian(random: &mut Random) -> f64 {
-    (-2.0 * (1.0 - random.part()).ln()).sqrt() * (TAU * random.part()).cos()
-}
-
 fn close(got: f64, want: f64, tolerance: f64) {
     assert!((got - want).abs() <= tolerance, "{got} instead of {want}");
+}
+
+fn caused(measured: &Measurement, cause: Cause) -> &Spur {
+    measured.spurs.iter().find(|spur| spur.causes.contains(&cause)).unwrap()
 }
 
 #[test]
@@ -152,7 +152,7 @@ fn a_large_second_tone_is_no_distortion() {
         let wave = |(f, a): (&f64, f64)| a * (TAU * (f * n as f64).fract()).cos();
         cycles.iter().zip(amplitudes).map(wave).sum::<f64>() + 1e-5 * noise
     };
-    let samples: Vec<f64> = (0..8192).map(|n| sample(n, gaussian(&mut random))).collect();
+    let samples: Vec<f64> = (0..8192).map(|n| sample(n, random.gaussian())).collect();
     let measured = measure(&samples, RATE, &Settings::default()).unwrap();
     close(measured.thd.0, 20.0 * (1e-3f64 / 0.6).log10(), 0.02);
     close(measured.sfdr.0, 20.0 * 2f64.log10(), 0.01);
@@ -204,7 +204,7 @@ fn harmonics_fold_and_add_up() {
     let sigma = 1e-4;
     let mut samples = tone(count, cycles, 0.9);
     for (n, x) in samples.iter_mut().enumerate() {
-        *x += 0.05 + sigma * gaussian(&mut random);
+        *x += 0.05 + sigma * random.gaussian();
         for (order, amplitude) in amplitudes {
             *x += amplitude * (TAU * order as f64 * cycles * n as f64).sin();
         }
@@ -217,17 +217,10 @@ fn harmonics_fold_and_add_up() {
     close(measured.sfdr.0, 20.0 * (0.9f64 / 1e-3).log10(), 0.1);
     close(measured.offset.value, 0.05, 5.0 * measured.offset.sigma);
     // 7 x 0.1713 = 1.1991 is seen at 0.1991 of the rate.
-    let seventh = measured
-        .spurs
-        .iter()
-        .find(|s| s.causes.contains(&Cause::Harmonic { order: 7, folded: true, tone: 0 }));
-    close(seventh.unwrap().frequency.0, 199_100.0, 1.0);
-    assert!(seventh.unwrap().above_noise);
-    let ninth = measured
-        .spurs
-        .iter()
-        .find(|s| s.causes.contains(&Cause::Harmonic { order: 9, folded: true, tone: 0 }));
-    assert!(!ninth.unwrap().above_noise);
+    let [seventh, ninth] =
+        [7, 9].map(|order| caused(&measured, Cause::Harmonic { order, folded: true, tone: 0 }));
+    close(seventh.frequency.0, 199_100.0, 1.0);
+    assert!(seventh.above_noise && !ninth.above_noise);
     assert_eq!((measured.interleaving, measured.sfdr_without_interleaving), (None, None));
     // Fewer harmonics, less distortion.
     let second = measure(&samples, RATE, &Settings { harmonics: 2, ..Settings::default() }).unwrap();
@@ -238,8 +231,7 @@ fn harmonics_fold_and_add_up() {
 fn the_noise_density_does_not_depend_on_the_window() {
     let (sigma, full_scale) = (3e-3, 2.5);
     let mut random = Random(8);
-    let samples: Vec<f64> =
-        tone(50_000, 0.1234, 2.0).iter().map(|x| x + sigma * gaussian(&mut random)).collect();
+    let samples: Vec<f64> = tone(50_000, 0.1234, 2.0).iter().map(|x| x + sigma * random.gaussian()).collect();
     let want = 10.0 * (sigma * sigma / 0.5e6 / (0.5 * full_scale * full_scale)).log10();
     for window in [Window::None, Window::Hann, Window::Bh4, Window::Bh7] {
         let settings = Settings { window, full_scale, rails: (-9.0, 9.0), ..Settings::default() };
@@ -295,8 +287,7 @@ fn two_tones_and_their_products() {
     let settings = Settings { tones: vec![RATE * 0.1013, RATE * 0.1197], ..Settings::default() };
     let measured = measure(&samples, RATE, &settings).unwrap();
     let product = Cause::Intermodulation { a: 2, first: 1, b: -1, second: 2 };
-    let spur = measured.spurs.iter().find(|spur| spur.causes.contains(&product)).unwrap();
-    close(spur.level.0, 20.0 * (2e-4f64 / 0.4).log10(), 0.01);
+    close(caused(&measured, product).level.0, 20.0 * (2e-4f64 / 0.4).log10(), 0.01);
     assert_eq!(product.to_string(), "intermodulation, 2 f1 -1 f2");
     close(measured.sinad.0, 10.0 * (2.0 * 0.16f64 / 4e-8).log10(), 0.01);
 }
@@ -382,7 +373,7 @@ fn lag_gain_and_error_against_a_reference() {
         let clean: Vec<f64> = waveform(6000, 0.0);
         // The beat belongs to the waveform, so it is delayed as well.
         let record: Vec<f64> =
-            waveform(6000, delay).iter().map(|x| gain * x + 0.25 + sigma * gaussian(&mut random)).collect();
+            waveform(6000, delay).iter().map(|x| gain * x + 0.25 + sigma * random.gaussian()).collect();
         let compared = compare(&record, &clean, RATE, Window::Hann).unwrap();
         close(compared.lag_samples.value, delay, 5.0 * compared.lag_samples.sigma);
         close(compared.gain.value, gain, 5.0 * compared.gain.sigma);
@@ -406,7 +397,7 @@ fn the_shortest_of_many_lags_is_taken() {
     for late in [-12.0, 7.3] {
         let noise = |n: i32| if n < 8000 { 1e-3 } else { 1e-5 };
         let record: Vec<f64> =
-            (0..24_000).map(|n| at(f64::from(n) - late) + noise(n) * gaussian(&mut random)).collect();
+            (0..24_000).map(|n| at(f64::from(n) - late) + noise(n) * random.gaussian()).collect();
         let found = compare(&record, &clean, RATE, Window::Bh7).unwrap();
         close(found.lag_samples.value, late, 1e-3);
     }
@@ -470,7 +461,7 @@ fn recordings_that_cannot_be_compared_are_refused() {
 fn ends_that_have_not_settled_are_found() {
     let tone: Vec<f64> = (0..8192).map(|n| 0.9 * (0.7317 * n as f64).sin()).collect();
     let mut random = Random(5);
-    let noisy: Vec<f64> = tone.iter().map(|x| x + 1e-4 * gaussian(&mut random)).collect();
+    let noisy: Vec<f64> = tone.iter().map(|x| x + 1e-4 * random.gaussian()).collect();
     let measured = |samples: &[f64]| measure(samples, RATE, &Settings::default()).unwrap();
     assert_eq!(measured(&noisy).unsettled_ends, None);
     // A filter with a memory of some ten samples had no input before the first one.
@@ -496,7 +487,7 @@ fn what_decides_sfdr_is_among_the_spurs() {
     let mut random = Random(6);
     for (spur, noise) in [(1e-3, 1e-5), (0.0, 1e-2), (1e-4, 1e-3)] {
         let wave = |n: usize| (0.7317 * n as f64).sin() + spur * (1.9 * n as f64).sin();
-        let samples: Vec<f64> = (0..4096).map(|n| 0.9 * wave(n) + noise * gaussian(&mut random)).collect();
+        let samples: Vec<f64> = (0..4096).map(|n| 0.9 * wave(n) + noise * random.gaussian()).collect();
         for window in [Window::None, Window::Bh7] {
             let found = measure(&samples, RATE, &Settings { window, ..Settings::default() }).unwrap();
             close(-found.spurs[0].level.0, found.sfdr.0, 1e-12);
@@ -511,7 +502,7 @@ fn a_static_nonlinearity_is_told_from_noise() {
     let bent = |curves: [f64; 2], random: &mut Random| -> Vec<f64> {
         let one = |n: usize, random: &mut Random| {
             let x = 0.9 * (0.7317 * n as f64).sin();
-            x + curves[n % 2] * (4.0 * x.powi(3) - 3.0 * x) + 1e-5 * gaussian(random)
+            x + curves[n % 2] * (4.0 * x.powi(3) - 3.0 * x) + 1e-5 * random.gaussian()
         };
         (0..16_384).map(|n| one(n, random)).collect()
     };

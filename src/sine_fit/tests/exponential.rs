@@ -17,10 +17,10 @@ fn exponential(fit: &SineFit, direction: Sense) -> ToneFit {
 /// c + a e^{j w n} + b e^{-j w n} with noise of the standard deviation `sigma` in each part.
 fn record(count: usize, cycles: f64, [c, a, b]: [Complex<f64>; 3], sigma: f64, seed: u64) -> [Vec<f64>; 2] {
     let mut random = Random(seed);
-    let mut gaussian = || (-2.0 * (1.0 - random.part()).ln()).sqrt() * (TAU * random.part()).cos() * sigma;
+    let mut noise = || random.gaussian() * sigma;
     let at = |n: usize| {
         let turn = Complex::from_polar(1.0, TAU * cycles * n as f64);
-        c + a * turn + b * turn.conj() + Complex::new(gaussian(), gaussian())
+        c + a * turn + b * turn.conj() + Complex::new(noise(), noise())
     };
     let samples: Vec<Complex<f64>> = (0..count).map(at).collect();
     [samples.iter().map(|z| z.re).collect(), samples.iter().map(|z| z.im).collect()]

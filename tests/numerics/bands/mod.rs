@@ -5,8 +5,8 @@
 //! by integrals over frequency in another program: the largest image of a tone in the band, and the SNR for
 //! white noise in the band.
 
+use crate::support::designed;
 use hybank::bank::Bank;
-use hybank::design::{DesignOptions, design};
 use hybank::figures::Figures;
 use hybank::spec::{DesignOverrides, Spec};
 use serde_json::Value;
@@ -39,7 +39,7 @@ fn systems() -> Vec<System> {
 
 /// Image and SNR, decibels.
 fn reached(spec: &Spec) -> [f64; 2] {
-    figures(&design(spec, &DesignOptions::without_proof()).unwrap().bank)
+    figures(&designed(spec))
 }
 
 fn figures(bank: &Bank) -> [f64; 2] {
@@ -67,8 +67,7 @@ fn banks_for_a_band_reach_the_figures_of_the_table() {
 #[test]
 fn banks_for_any_input_do_not_know_the_band() {
     for System { spec, without, with_band } in systems() {
-        let mut bank =
-            design(&Spec { signal: None, ..spec.clone() }, &DesignOptions::without_proof()).unwrap().bank;
+        let mut bank = designed(&Spec { signal: None, ..spec.clone() });
         bank.spec = Some(spec);
         let found = figures(&bank);
         println!(

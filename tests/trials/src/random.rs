@@ -37,6 +37,11 @@ impl Random {
         2.0 * self.part() - 1.0
     }
 
+    /// A Gaussian number of unit variance (Box and Muller, 1958).
+    pub fn gaussian(&mut self) -> f64 {
+        (-2.0 * (1.0 - self.part()).ln()).sqrt() * (std::f64::consts::TAU * self.part()).cos()
+    }
+
     /// One of a list.
     pub fn of<T: Copy>(&mut self, list: &[T]) -> T {
         list[self.below(list.len())]

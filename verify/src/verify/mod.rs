@@ -50,8 +50,6 @@ mod spectrum;
 mod state_transition;
 mod statements;
 mod system;
-#[cfg(test)]
-mod tests;
 mod timeline;
 mod uncertainty;
 
@@ -95,3 +93,6 @@ pub fn verify(bank: &Bank) -> Result<Verified, VerifyError> {
     uncertainty::check_stated(bank)?;
     Ok(verified)
 }
+
+#[cfg(test)]
+mod tests;

@@ -64,9 +64,7 @@ fn banks_of_no_use_are_refused() {
         desk.write("spec.toml", spec(latency));
         let parts = ["spec.toml", "of no use, so it is not written", reason, "--force writes it"];
         desk.refused(1, &["design", "spec.toml", "-o", "b.json"], &parts);
-        let output = desk.run(&["design", "spec.toml", "-o", "b.json", "--force"], b"");
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert!(output.status.success() && said.contains(reason), "{said}");
+        desk.warned(&["design", "spec.toml", "-o", "b.json", "--force"], &[reason]);
         std::fs::remove_file(desk.path("b.json")).unwrap();
     }
 }

@@ -22,11 +22,12 @@
 mod chunks;
 mod header;
 mod reader;
-#[cfg(test)]
-mod tests;
 mod writer;
 
 pub use header::{WavChunk, WavHeader};
 pub use reader::WavReader;
 pub(super) use writer::WavFile;
 pub use writer::stream_header;
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::design::{DesignOptions, design};
+use crate::tests::{after_thesis_filter, designed};
 use hybank_core::bank::SynthesisFilters;
 use hybank_core::spec::{Band, SignalSpec, Spec};
 use hybank_core::units::Seconds;
@@ -106,12 +106,7 @@ fn delay_errors_move_the_samples() {
 }
 
 fn recursive_bank(channels: &str, latency: usize) -> Bank {
-    let text = format!(
-        "fast_period = 1.0\nratio = 2\nlatency = {latency}\nchannel = [{channels}]\n\
-         target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n\
-         design = {{ method = \"iir\" }}"
-    );
-    design(&Spec::from_toml(&text, "spec.toml").unwrap(), &DesignOptions::default()).unwrap().bank
+    designed(&after_thesis_filter(2, latency, channels, "method = \"iir\"")).bank
 }
 
 /// Converters that sample exactly in turn have the ideal samples: plain interleaving makes no error.

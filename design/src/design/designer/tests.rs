@@ -1,17 +1,13 @@
 mod signal;
 
 use super::*;
+use crate::tests::{after_thesis_filter, designed};
 use hybank_core::bank::SynthesisFilters;
 use hybank_core::spec::Method;
 use hybank_core::units::Seconds;
 
 fn spec(design: &str, channels: &str) -> Spec {
-    let text = format!(
-        "fast_period = 1.0\nratio = 2\nlatency = 10\n\
-         target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n\
-         channel = [{channels}]\ndesign = {{ {design} }}"
-    );
-    Spec::from_toml(&text, "spec.toml").unwrap()
+    after_thesis_filter(2, 10, channels, design)
 }
 
 const THESIS: &str = "{ delay = 1.2 }, { delay = 0.6 }";
@@ -40,7 +36,7 @@ fn a_spec_made_in_memory_is_checked_first() {
 fn taps_that_the_designer_chose_are_stated() {
     for method in ["sinc", "separation"] {
         let open = spec(&format!("method = \"{method}\""), THESIS);
-        let found = design(&open, &DesignOptions::without_proof()).unwrap();
+        let found = designed(&open);
         assert_eq!((found.sizing.taps, found.sizing.taps_chosen), (23, true));
         // The bank says what was asked, and beside it what was chosen.
         assert_eq!(found.bank.spec, Some(open));
@@ -48,11 +44,11 @@ fn taps_that_the_designer_chose_are_stated() {
         assert!(taps.iter().all(|filter| filter.len() == 23));
         // With nothing left to choose the bank is the same.
         let sized = found.bank.sized_spec().unwrap();
-        let again = design(&sized, &DesignOptions::without_proof()).unwrap();
+        let again = designed(&sized);
         assert!(!again.sizing.taps_chosen && !again.sizing.latency_chosen);
         assert_eq!(again.bank, Bank { spec: Some(sized), ..found.bank });
     }
-    let recursive = design(&spec("method = \"iir\"", THESIS), &DesignOptions::without_proof()).unwrap();
+    let recursive = designed(&spec("method = \"iir\"", THESIS));
     assert!(!recursive.sizing.taps_chosen && recursive.sizing.taps == 0);
 }
 
@@ -65,7 +61,7 @@ fn a_design_carries_its_proof_or_the_reason_why_there_is_none() {
         assert!(found.bank.proof.is_some());
         assert_eq!(found.bank.gamma.upper, Some(proven.upper));
         assert!(found.bank.gamma.norm.unwrap() < proven.upper, "{proven:?}");
-        let skipped = design(&spec, &DesignOptions::without_proof()).unwrap();
+        let skipped = designed(&spec);
         assert_eq!(skipped.proof, Err(DesignError::ProofSkipped));
         assert!(skipped.bank.proof.is_none() && skipped.bank.filters == found.bank.filters);
     }
@@ -78,7 +74,7 @@ fn channels_that_are_alike_share_one_filter_by_their_noise() {
         "method = \"fir\", taps = 14",
         "{ delay = 1.2 }, { delay = 0.6, noise = 1e-9 }, { delay = 0.6, noise = 2e-9 }",
     );
-    let taps = |spec: &Spec| match design(spec, &DesignOptions::without_proof()).unwrap().bank.filters {
+    let taps = |spec: &Spec| match designed(spec).bank.filters {
         SynthesisFilters::Fir(taps) => taps,
         SynthesisFilters::StateSpace(_) => unreachable!(),
     };
@@ -88,7 +84,7 @@ fn channels_that_are_alike_share_one_filter_by_their_noise() {
         // Shares in inverse proportion to the powers, 4 : 1.
         assert!((quiet - 4.0 * loud).abs() <= 1e-15 + 1e-12 * quiet.abs(), "{quiet} {loud}");
     }
-    let norm = |spec: &Spec| design(spec, &DesignOptions::without_proof()).unwrap().bank.gamma.norm.unwrap();
+    let norm = |spec: &Spec| designed(spec).bank.gamma.norm.unwrap();
     assert!((norm(&alone) / norm(&twice) - 1.0).abs() < 2e-3);
 }
 
@@ -98,7 +94,7 @@ fn channels_that_are_alike_share_one_filter_by_their_noise() {
 fn a_design_that_is_ended_has_its_best_bank_so_far() {
     for method in ["method = \"fir\", taps = 22", "method = \"iir\""] {
         let spec = spec(method, THESIS);
-        let complete = design(&spec, &DesignOptions::without_proof()).unwrap().bank.gamma;
+        let complete = designed(&spec).bank.gamma;
         let stop = Stop::default();
         let at_filters = |stage| {
             if stage == Stage::Filters {
@@ -139,7 +135,7 @@ fn a_design_ends_at_every_stage_with_a_bank() {
     ];
     for text in designs {
         let spec = spec(text, THESIS);
-        let complete = design(&spec, &DesignOptions::without_proof()).unwrap().bank;
+        let complete = designed(&spec).bank;
         for last in [Stage::Filters, Stage::Realisation, Stage::Proof] {
             let stop = Stop::default();
             let observer = |stage| {
@@ -198,9 +194,7 @@ fn the_stated_accuracy_does_not_depend_on_units() {
                 channel(1.2),
                 channel(0.6),
             );
-            let found =
-                design(&Spec::from_toml(&text, "spec.toml").unwrap(), &DesignOptions::without_proof());
-            let gamma = found.unwrap().bank.gamma;
+            let gamma = designed(&Spec::from_toml(&text, "spec.toml").unwrap()).bank.gamma;
             (gamma.norm.unwrap() / output, gamma.upper.unwrap() / gamma.norm.unwrap())
         };
         let plain = figures(1.0, 1.0);

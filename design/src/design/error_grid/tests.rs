@@ -1,16 +1,10 @@
 use super::*;
-use crate::design::problem::Problem;
 use crate::lti::FirMatrix;
 use crate::lti::gramian::h2_norm;
-use hybank_core::spec::Spec;
+use crate::tests::{self, after_thesis_filter};
 
 fn plant(ratio: usize) -> LiftedPlant {
-    let text = format!(
-        "fast_period = 1.0\nratio = {ratio}\nlatency = 6\n\
-         target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n\
-         channel = [{{ delay = 1.2 }}, {{ delay = 0.6 }}]\ndesign = {{ method = \"iir\" }}"
-    );
-    LiftedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), 6).unwrap())
+    tests::plant(&after_thesis_filter(ratio, 6, "{ delay = 1.2 }, { delay = 0.6 }", "method = \"iir\""))
 }
 
 fn taps(count: usize) -> Vec<Vec<f64>> {

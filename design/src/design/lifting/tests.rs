@@ -2,39 +2,15 @@
 //! e^{-a |t|}, so all covariances of samples are known from their times alone.
 
 use super::*;
-use crate::design::problem::Channel;
 use crate::lti::gramian::controllability_root;
+use crate::tests::front_ends::bank;
 use hybank_core::spec::FilterSpec;
-use hybank_core::units::{GridTime, Seconds};
-use hybank_verify::analog::StrictlyProper;
 
 fn one_pole(poles: &[f64], ratio: usize, latency: usize, channels: &[(usize, f64)]) -> Problem {
-    let filter = |a: &f64| {
-        let spec = FilterSpec::TransferFunction { num: vec![*a], den: vec![1.0, *a] };
-        StrictlyProper::new(&spec, Seconds(1.0)).unwrap()
-    };
-    Problem {
-        fast_period: Seconds(1.0),
-        ratio,
-        latency,
-        signal: None,
-        band: None,
-        front_ends: poles.iter().map(filter).collect(),
-        target: 0,
-        channels: channels
-            .iter()
-            .enumerate()
-            .map(|(converter, &(front_end, delay))| Channel {
-                front_end,
-                converter,
-                gain: 1.0,
-                converter_gain: 1.0,
-                delay: GridTime::new(Seconds(delay), Seconds(1.0)),
-            })
-            .collect(),
-        wait: 0,
-        noise: vec![0.0; channels.len()],
-    }
+    let filter = |a: f64| FilterSpec::TransferFunction { num: vec![a], den: vec![1.0, a] };
+    let (own, delays): (Vec<FilterSpec>, Vec<f64>) =
+        channels.iter().map(|&(front_end, delay)| (filter(poles[front_end]), delay)).unzip();
+    Problem::of_bank(&bank(filter(poles[0]), own, &delays, ratio, latency, 1)).unwrap()
 }
 
 fn problems() -> Vec<Problem> {

@@ -4,6 +4,7 @@ use super::*;
 use crate::design::filters::lifted;
 use crate::design::merging::Repeats;
 use crate::lti::FirMatrix;
+use crate::tests::after_thesis_filter;
 use hybank_core::spec::Spec;
 use hybank_core::units::Seconds;
 use hybank_linalg::{CMat, Complex};
@@ -43,16 +44,8 @@ const CASES: [Case; 7] = [
 
 fn spec(case: &Case, method: Method) -> Spec {
     let taps = if method.has_taps() { ", taps = 13" } else { "" };
-    let text = format!(
-        "fast_period = 1.0\nratio = {}\nlatency = {}\n\
-         target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n\
-         channel = [{}]\ndesign = {{ method = \"{}\"{taps} }}",
-        case.ratio,
-        case.latency,
-        case.channels,
-        method.name()
-    );
-    Spec::from_toml(&text, "spec.toml").unwrap()
+    let design = format!("method = \"{}\"{taps}", method.name());
+    after_thesis_filter(case.ratio, case.latency, case.channels, &design)
 }
 
 /// A plant without identical channels, as the designer passes it to a method.

@@ -1,17 +1,12 @@
 use super::*;
 use crate::design::merging::Repeats;
-use hybank_core::spec::Spec;
+use crate::tests::after_thesis_filter;
 use hybank_linalg::Complex;
 
 /// Channels with feedthrough, at the border of a period and delayed by whole periods.
 fn plants() -> Vec<LiftedPlant> {
     let plant = |ratio: usize, latency: usize, delays: &str| {
-        let text = format!(
-            "fast_period = 1.0\nratio = {ratio}\nlatency = {latency}\n\
-             target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n\
-             channel = [{delays}]\ndesign = {{ method = \"iir\" }}"
-        );
-        LiftedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), latency).unwrap())
+        crate::tests::plant(&after_thesis_filter(ratio, latency, delays, "method = \"iir\""))
     };
     vec![
         plant(2, 10, "{ delay = 1.2 }, { delay = 0.6 }"),

@@ -3,8 +3,6 @@
 
 mod box_bound;
 mod enclosed_norm;
-#[cfg(test)]
-mod tests;
 mod upper;
 
 use super::DesignError;
@@ -129,3 +127,6 @@ fn witness(frequency: f64, reference: &CMat) -> GainWitness {
     let reference = reference.iter().map(|z| [z.re + 0.0, z.im + 0.0]).collect();
     GainWitness { half: half(frequency), reference }
 }
+
+#[cfg(test)]
+mod tests;

@@ -4,15 +4,12 @@
 use super::*;
 use crate::design::{DesignOptions, LiftedPlant, Problem, analyze, design, filters};
 use crate::lti::{FrequencyResponse, StateSpace};
-use front_ends::{alike, bank, cases, family, thesis_filter};
+use crate::tests::front_ends::{alike, bank, cases, family, thesis_filter};
 use hybank_core::bank::{Certificate, Gamma, StateMatrices, SynthesisFilters};
 use hybank_core::spec::{DesignSpec, Family, Method};
 use hybank_linalg::CMat;
 use hybank_verify::verify::{Midpoint, Verified, VerifyError, verify};
 use std::f64::consts::TAU;
-
-#[path = "../../../../tests/support/front_ends.rs"]
-mod front_ends;
 
 /// K(z) K(z)* by the designer's route.
 fn designers(bank: &Bank, omega: f64) -> CMat {

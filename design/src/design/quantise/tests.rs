@@ -4,8 +4,9 @@ use super::*;
 use crate::design::error_grid::ErrorGrid;
 use crate::design::plant::LiftedPlant;
 use crate::design::reduction::Aim;
-use crate::design::{DesignOptions, Problem, Stop, design};
+use crate::design::{Problem, Stop};
 use crate::lti::FirMatrix;
+use crate::tests::designed;
 use hybank_core::bank::SynthesisFilters;
 use hybank_core::spec::{MAX_FRACTION_BITS, Spec};
 use std::sync::LazyLock;
@@ -17,7 +18,7 @@ const THESIS: &str = include_str!("../../../../filters/thesis-fir.toml");
 /// A plant with the taps of its optimal FIR bank.
 fn optimum(spec: &str) -> (LiftedPlant, Vec<Vec<f64>>) {
     let spec = Spec::from_toml(spec, "spec.toml").unwrap();
-    let found = design(&spec, &DesignOptions::without_proof()).unwrap();
+    let found = designed(&spec);
     let SynthesisFilters::Fir(taps) = found.bank.filters else { unreachable!() };
     (LiftedPlant::new(&Problem::new(&spec, found.bank.latency).unwrap()), taps)
 }
@@ -105,12 +106,22 @@ fn far_better_than_rounding_where_the_channels_carry_little() {
 
 #[test]
 fn more_bits_cost_no_more_and_in_the_end_nothing() {
+    let with_gain = |spec: &str, delay: &str, gain: &str| {
+        let filter = format!("{delay}\nfilter = {{ num = [{gain}], den = [1.0, 1.0, 0.25] }}");
+        spec.replacen(delay, &filter, 1)
+    };
+    let unequal =
+        with_gain(&with_gain(THESIS, "delay_samples = 1.2", "250.0"), "delay_samples = 0.6", "0.00025");
+    for (spec, bits, more) in [(THESIS, 6, 0.01), (&unequal, 8, 0.001)] {
+        let (plant, taps) = optimum(spec);
+        let real = exact(&plant, taps.clone());
+        let (_, study) = quantise(problem(&plant, &taps), real, &WordLengths::Same(bits), None).unwrap();
+        let losses: Vec<f64> = study.words.iter().map(|word| word.loss_db).collect();
+        assert_eq!(losses.len(), 5);
+        assert!(losses.windows(2).all(|pair| pair[1] <= pair[0] + more), "{losses:?}");
+    }
     let (plant, taps) = optimum(THESIS);
     let real = exact(&plant, taps.clone());
-    let (_, study) = quantise(problem(&plant, &taps), real, &WordLengths::Same(6), None).unwrap();
-    let losses: Vec<f64> = study.words.iter().map(|word| word.loss_db).collect();
-    assert_eq!(losses.len(), 5);
-    assert!(losses.windows(2).all(|pair| pair[1] <= pair[0] + 0.01), "{losses:?}");
     let (integers, _) = quantise(problem(&plant, &taps), real, &WordLengths::Same(24), None).unwrap();
     assert!(exact(&plant, integers.taps()) < real * (1.0 + 1e-5));
 }
@@ -169,26 +180,6 @@ fn equal_channels_share_finer_steps_than_their_own() {
     let (quantiser, words) = (quantiser(&plant, &taps).unwrap(), WordLengths::Same(4));
     let found = quantiser.quantise(&words, None).unwrap();
     assert!(found.gamma <= quantiser.rounded(&words, None).unwrap() * (1.0 + SETTINGS.gamma_tie));
-}
-
-#[test]
-fn more_bits_never_cost_more_even_with_channels_of_unequal_gain() {
-    let unequal = THESIS
-        .replacen(
-            "delay_samples = 1.2",
-            "delay_samples = 1.2\nfilter = { num = [250.0], den = [1.0, 1.0, 0.25] }",
-            1,
-        )
-        .replacen(
-            "delay_samples = 0.6",
-            "delay_samples = 0.6\nfilter = { num = [0.00025], den = [1.0, 1.0, 0.25] }",
-            1,
-        );
-    let (plant, taps) = optimum(&unequal);
-    let (_, study) =
-        quantise(problem(&plant, &taps), exact(&plant, taps.clone()), &WordLengths::Same(8), None).unwrap();
-    let losses: Vec<f64> = study.words.iter().map(|word| word.loss_db).collect();
-    assert!(losses.windows(2).all(|pair| pair[1] <= pair[0] + 0.001), "{losses:?}");
 }
 
 #[test]

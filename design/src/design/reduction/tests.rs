@@ -1,14 +1,14 @@
 use super::plant_samples::PlantSamples;
 use super::truncation::{self, ReducedRecursion, mean_square_bank};
 use super::*;
-use crate::design::Problem;
 use crate::design::filters::lifted;
 use crate::design::methods::{MethodSettings, synthesise};
 use crate::design::plant::LiftedPlant;
 use crate::lti::gramian::{balanced, h2_norm};
 use crate::lti::peak::hinf_norm;
 use crate::lti::{FirWithTail, StateSpace};
-use hybank_core::spec::{Method, Spec};
+use crate::tests::{self, after_thesis_filter};
+use hybank_core::spec::Method;
 use hybank_linalg::{Complex, Mat};
 use std::sync::LazyLock;
 
@@ -16,12 +16,7 @@ static NEVER: LazyLock<Stop> = LazyLock::new(Stop::default);
 
 /// The thesis example with other delays and latency.
 fn plant(latency: usize, delays: &str) -> LiftedPlant {
-    let text = format!(
-        "fast_period = 1.0\nratio = 2\nlatency = {latency}\n\
-         target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n\
-         channel = [{delays}]\ndesign = {{ method = \"iir\" }}"
-    );
-    LiftedPlant::new(&Problem::new(&Spec::from_toml(&text, "spec.toml").unwrap(), latency).unwrap())
+    tests::plant(&after_thesis_filter(2, latency, delays, "method = \"iir\""))
 }
 
 fn thesis(latency: usize) -> LiftedPlant {

@@ -3,6 +3,7 @@ use crate::design::fir_errors::FirErrors;
 use crate::design::length::TargetFigure;
 use crate::design::root_covariance::RootCovariance;
 use crate::lmi::sampled;
+use crate::tests::designed;
 use hybank_core::spec::{DesignSpec, FilterSpec};
 
 /// The problem of a spec in normalised time with the same filter everywhere.
@@ -220,7 +221,7 @@ fn in_band(design: &str) -> Spec {
 fn figures_of(spec: &Spec, taps: usize) -> crate::figures::Figures {
     let mut sized = spec.clone();
     sized.design = sized.design.with_taps(Some(taps));
-    let bank = crate::design::design(&sized, &crate::design::DesignOptions::without_proof()).unwrap().bank;
+    let bank = designed(&sized).bank;
     crate::figures::Figures::new(&bank).unwrap()
 }
 
@@ -238,8 +239,7 @@ fn open_taps_bring_images_below_the_noise() {
     let taps = Sizing::of(&spec).unwrap().taps;
     let below = |taps: usize| {
         let quiet = in_band(&format!("taps = {taps}"));
-        let mut bank =
-            crate::design::design(&quiet, &crate::design::DesignOptions::without_proof()).unwrap().bank;
+        let mut bank = designed(&quiet).bank;
         bank.spec = Some(Spec { channels: spec.channels.clone(), ..quiet });
         let figures = crate::figures::Figures::new(&bank).unwrap();
         -figures.image.unwrap().db.0 - figures.snr.noise_db.unwrap().0

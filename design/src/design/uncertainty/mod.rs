@@ -15,10 +15,10 @@
 pub(super) mod box_plant;
 pub(super) mod search;
 mod study;
-#[cfg(test)]
-mod tests;
 mod widths;
 
 pub use study::BoxStudy;
-pub use widths::in_field;
-pub use widths::{BoxRule, BoxWidths, ReferenceChannel, Refused, RefusedBox};
+pub use widths::{BoxWidths, ReferenceChannel};
+
+#[cfg(test)]
+mod tests;

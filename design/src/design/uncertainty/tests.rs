@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::design::filters::FilterResponse;
-use crate::design::{DesignError, DesignOptions, design, norm_at};
+use crate::design::{DesignError, norm_at};
+use crate::tests::designed;
 use hybank_core::bank::Bank;
 use hybank_core::spec::{ErrorBox, ErrorPoint, Spec};
 use hybank_core::units::{FastPeriods, RadiansPerFastPeriod};
@@ -22,7 +23,7 @@ fn thesis() -> Bank {
 }
 
 fn bank(text: &str) -> Bank {
-    design(&Spec::from_toml(text, "spec.toml").unwrap(), &DesignOptions::without_proof()).unwrap().bank
+    designed(&Spec::from_toml(text, "spec.toml").unwrap()).bank
 }
 
 fn delays(half: f64) -> ErrorBox {

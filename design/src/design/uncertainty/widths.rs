@@ -2,7 +2,9 @@
 
 use hybank_core::bank::Bank;
 use hybank_core::quantity::WrittenTime;
-use hybank_core::spec::{ChannelCount, ErrorBox, SpecProblem, check_delay_half_width, for_channels};
+use hybank_core::spec::{
+    At, ErrorBox, SpecError, SpecProblem, check_delay_half_width, for_channels, refused,
+};
 use hybank_core::units::{FastPeriods, Seconds};
 use std::str::FromStr;
 
@@ -55,83 +57,34 @@ impl FromStr for ReferenceChannel {
     }
 }
 
-/// A setting that is refused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{rule}")]
-pub struct Refused<R> {
-    /// Its field.
-    pub field: &'static str,
-    /// Why.
-    pub rule: R,
-}
-
-/// A field of [`BoxWidths`] that is refused.
-pub type RefusedBox = Refused<BoxRule>;
-
-/// A rule for boxes of errors.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum BoxRule {
-    /// A number out of its range.
-    #[error(transparent)]
-    Number(Box<SpecProblem>),
-    /// A list of another length.
-    #[error(transparent)]
-    Count(#[from] ChannelCount),
-    /// A width below 0.
-    #[error("the box reaches as far in both directions; give the positive half-width")]
-    Negative,
-    /// A share that is too large for the proof.
-    #[error("shares of 50% and more are not supported")]
-    Share,
-    /// There is no such channel.
-    #[error("the bank has {channels} channels; give 1 to {channels}, or none")]
-    NoChannel {
-        /// As given, from 1.
-        channel: usize,
-        /// Channels of the bank.
-        channels: usize,
-    },
-}
-
-impl From<SpecProblem> for BoxRule {
-    fn from(problem: SpecProblem) -> Self {
-        Self::Number(Box::new(problem))
-    }
-}
-
-/// Names the field of a refusal.
-pub fn in_field<T, R>(field: &'static str, result: Result<T, impl Into<R>>) -> Result<T, Refused<R>> {
-    result.map_err(|rule| Refused { field, rule: rule.into() })
-}
-
 impl BoxWidths {
     /// The box for the channels of `bank`; `None` if no width is given.
     ///
     /// # Errors
-    /// [`RefusedBox`]: widths out of their range, lists of another length, a reference that is not there.
-    pub fn error_box(&self, bank: &Bank) -> Result<Option<ErrorBox>, RefusedBox> {
+    /// [`SpecError`] with the field: widths out of their range, lists of another length, a reference that is
+    /// not there.
+    pub fn error_box(&self, bank: &Bank) -> Result<Option<ErrorBox>, SpecError> {
         let channels = bank.channel_count();
         if let Some(ReferenceChannel::Channel(channel)) = self.reference
             && !(1..=channels).contains(&channel)
         {
-            return in_field("reference", Err(BoxRule::NoChannel { channel, channels }));
+            let rule = format!("the bank has {channels} channels; give 1 to {channels}, or none");
+            return Err(refused("reference", rule));
         }
         let delays = self.delay_box.iter().map(|time| checked(time.in_seconds(bank.fast_period), bank));
-        let delays = in_field("delay_box", delays.collect::<Result<Vec<FastPeriods>, BoxRule>>())?;
-        in_field("gain_box", self.gain_box.iter().try_for_each(check_share))?;
-        in_field("cutoff_box", self.cutoff_box.iter().try_for_each(check_share))?;
-        let is_given = !(delays.is_empty() && self.gain_box.is_empty() && self.cutoff_box.is_empty());
+        let delays = delays.collect::<Result<Vec<FastPeriods>, SpecProblem>>().at("delay_box")?;
+        self.gain_box.iter().try_for_each(check_share).at("gain_box")?;
+        self.cutoff_box.iter().try_for_each(check_share).at("cutoff_box")?;
         let errors = ErrorBox {
-            delays: in_field("delay_box", self.relative(&delays, channels))?,
-            gains: in_field("gain_box", self.relative(&self.gain_box, channels))?,
-            cutoffs: in_field("cutoff_box", self.relative(&self.cutoff_box, channels))?,
+            delays: self.relative(&delays, channels).at("delay_box")?,
+            gains: self.relative(&self.gain_box, channels).at("gain_box")?,
+            cutoffs: self.relative(&self.cutoff_box, channels).at("cutoff_box")?,
         };
-        Ok(is_given.then_some(errors))
+        Ok(self.has_box().then_some(errors))
     }
 
     /// Values of all channels, 0 for the reference.
-    fn relative<T: Copy + Default>(&self, given: &[T], channels: usize) -> Result<Vec<T>, ChannelCount> {
+    fn relative<T: Copy + Default>(&self, given: &[T], channels: usize) -> Result<Vec<T>, SpecProblem> {
         let exact = match self.reference {
             Some(ReferenceChannel::None) => None,
             Some(ReferenceChannel::Channel(channel)) => Some(channel - 1),
@@ -146,19 +99,24 @@ impl BoxWidths {
     }
 }
 
-fn checked(delay: Seconds, bank: &Bank) -> Result<FastPeriods, BoxRule> {
+fn checked(delay: Seconds, bank: &Bank) -> Result<FastPeriods, SpecProblem> {
     if delay.0 < 0.0 {
-        return Err(BoxRule::Negative);
+        return Err(negative());
     }
     let periods = delay.in_fast_periods(bank.fast_period);
     check_delay_half_width(periods, delay)?;
     Ok(periods)
 }
 
-fn check_share(share: &f64) -> Result<(), BoxRule> {
+fn check_share(share: &f64) -> Result<(), SpecProblem> {
     match *share {
         share if (0.0..MOST_SHARE).contains(&share) => Ok(()),
-        share if share < 0.0 => Err(BoxRule::Negative),
-        _ => Err(BoxRule::Share),
+        share if share < 0.0 => Err(negative()),
+        _ => Err(SpecProblem::Value { message: "shares of 50% and more are not supported".to_owned() }),
     }
+}
+
+fn negative() -> SpecProblem {
+    let message = "the box reaches as far in both directions; give the positive half-width";
+    SpecProblem::Value { message: message.to_owned() }
 }

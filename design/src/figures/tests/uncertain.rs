@@ -33,7 +33,7 @@ impl Case {
             offset: Some(OneOrEach::Same(errors.offset)),
             ..UncertaintySpec::default()
         });
-        let bank = design(&spec, &DesignOptions::without_proof()).unwrap().bank;
+        let bank = designed(&spec).bank;
         let plain = without_signal(&spec, bank.latency).unwrap();
         Self { errors, bank, plain }
     }

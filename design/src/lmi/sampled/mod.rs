@@ -62,8 +62,6 @@ mod newton;
 mod prepare;
 mod problem;
 mod quadratic;
-#[cfg(test)]
-mod tests;
 mod worst_case;
 
 pub use bound::LowerBound;
@@ -74,3 +72,6 @@ pub(crate) use mean_square::least_squares;
 pub use mean_square::{CappedMeanSquare, mean_square_under_cap};
 pub use problem::{FrequencyPoint, MeanSquareObjective, SampledProblem};
 pub use worst_case::{Solution, minimise};
+
+#[cfg(test)]
+mod tests;

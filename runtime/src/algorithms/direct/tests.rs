@@ -48,45 +48,23 @@ fn twin(taps: &[Vec<f64>], ratio: usize, input: &[f32], fused: bool) -> Vec<f32>
     (0..input.len() / n).flat_map(|k| (0..ratio).map(move |p| (k, p))).map(|(k, p)| output(k, p)).collect()
 }
 
+/// N, M, taps and frames.
+fn has_the_bits_of_the_twin((n, m, count, frames): (usize, usize, usize, usize), noise: &mut Noise) {
+    let taps = random_taps(n, count, noise);
+    let input = noise.samples(n * frames);
+    for isa in Isa::available() {
+        let got = run(&fir_bank(taps.clone(), m), Options { isa, ..Options::default() }, &input);
+        assert_eq!(got, twin(&taps, m, &input, fuses(isa)), "N {n} M {m}, {count} taps, {isa}");
+    }
+}
+
 #[test]
-fn every_small_shape_has_the_bits_of_the_scalar_twin() {
+fn small_shapes_every_tap_count_and_large_shapes_have_the_bits_of_the_scalar_twin() {
+    let small = (1..=9).flat_map(|n| (1..=17).map(move |m| (n, m, 1 + (7 * n + 5 * m) % 40, 100 + 13 * m)));
+    let counts = (1..=70).map(|count| (2, 2, count, count));
+    let large = [(40, 3), (3, 40), (33, 33)].map(|(n, m)| (n, m, 3 * m + 1, 300));
     let mut noise = Noise(1);
-    for n in 1..=9 {
-        for m in 1..=17 {
-            let taps = random_taps(n, 1 + (7 * n + 5 * m) % 40, &mut noise);
-            let input = noise.samples(n * (100 + 13 * m));
-            for isa in Isa::available() {
-                let got = run(&fir_bank(taps.clone(), m), Options { isa, ..Options::default() }, &input);
-                assert_eq!(got, twin(&taps, m, &input, fuses(isa)), "N {n} M {m} {isa}");
-            }
-        }
-    }
-}
-
-#[test]
-fn every_tap_count_and_length_has_the_bits_of_the_scalar_twin() {
-    let mut noise = Noise(2);
-    for count in 1..=70 {
-        let taps = random_taps(2, count, &mut noise);
-        let input = noise.samples(2 * count);
-        for isa in Isa::available() {
-            let got = run(&fir_bank(taps.clone(), 2), Options { isa, ..Options::default() }, &input);
-            assert_eq!(got, twin(&taps, 2, &input, fuses(isa)), "{count} taps, {isa}");
-        }
-    }
-}
-
-#[test]
-fn many_channels_and_many_phases_work() {
-    let mut noise = Noise(3);
-    for (n, m) in [(40, 3), (3, 40), (33, 33)] {
-        let taps = random_taps(n, 3 * m + 1, &mut noise);
-        let input = noise.samples(n * 300);
-        for isa in Isa::available() {
-            let got = run(&fir_bank(taps.clone(), m), Options { isa, ..Options::default() }, &input);
-            assert_eq!(got, twin(&taps, m, &input, fuses(isa)), "N {n} M {m} {isa}");
-        }
-    }
+    small.chain(counts).chain(large).for_each(|shape| has_the_bits_of_the_twin(shape, &mut noise));
 }
 
 /// Filters that look back exactly as far as a block is long, or about, leave no whole vector of the first

@@ -15,8 +15,6 @@
 //! their batch.
 
 mod shape;
-#[cfg(test)]
-mod tests;
 
 pub(crate) use shape::TransformShape;
 
@@ -266,3 +264,6 @@ impl<N: FftNum> fmt::Debug for Transform<N> {
         write!(f, "Transform({})", self.0.len())
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -11,8 +11,6 @@
 
 mod delay_lines;
 mod layout;
-#[cfg(test)]
-mod tests;
 
 pub use self::delay_lines::{DelayLines, DelayedInput};
 use self::layout::HistoryLayout;
@@ -258,3 +256,6 @@ fn check_matrix(
         None => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests;

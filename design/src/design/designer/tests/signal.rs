@@ -2,6 +2,7 @@
 
 use crate::design::analyze;
 use crate::design::designer::*;
+use crate::tests::designed;
 use hybank_verify::verify;
 
 /// Two channels with different front ends and gains, in two ways: a signal, and W in cascade by hand.
@@ -34,8 +35,7 @@ const SIGNALS: [&str; 2] = [
 fn a_signal_is_a_stage_that_all_front_ends_share() {
     for w in SIGNALS {
         for method in ["method = \"fir\", taps = 16", "method = \"iir\"", "method = \"h2\""] {
-            let [with_signal, by_hand] =
-                both(w, method).map(|spec| design(&spec, &DesignOptions::without_proof()).unwrap());
+            let [with_signal, by_hand] = both(w, method).map(|spec| designed(&spec));
             let norms = [&with_signal, &by_hand].map(|design| design.bank.gamma.norm.unwrap());
             assert!((norms[0] / norms[1] - 1.0).abs() < 2e-6, "{w} {method}: {norms:?}");
             // The bank of one way has the same error when the other way judges it.
@@ -80,7 +80,7 @@ fn a_band_is_designed_for() {
         Spec::from_toml(&text, "spec.toml").unwrap()
     };
     let gamma = |signal: &str| {
-        let design = design(&spec(signal), &DesignOptions::without_proof()).unwrap();
+        let design = designed(&spec(signal));
         (design.bank.gamma.norm.unwrap(), design.bank.spec.unwrap().signal.map(|signal| signal.floor_db))
     };
     assert_eq!(gamma("").1, None);

@@ -6,13 +6,14 @@
 
 use crate::design::filters::lifted;
 use crate::design::problem::Problem;
-use crate::design::{Design, DesignOptions, LiftedPlant, analyze_mean, design};
+use crate::design::{Design, LiftedPlant, analyze_mean};
 use crate::figures::Figures;
 use crate::lti::gramian::h2_norm;
+use crate::tests::designed;
+use crate::tests::front_ends::specs::{alike, low_pass_at, thesis_filter};
 use hybank_core::bank::SynthesisFilters;
 use hybank_core::spec::{
-    ChannelSpec, DesignSpec, ErrorPoint, Family, FilterSpec, Method, OneOrEach, Passband, Spec,
-    UncertaintySpec,
+    ChannelSpec, DesignSpec, ErrorPoint, Family, FilterSpec, Method, OneOrEach, Spec, UncertaintySpec,
 };
 use hybank_core::units::{FastPeriods, Hertz, Seconds};
 use hybank_linalg::Complex;
@@ -40,18 +41,15 @@ impl Case {
             ..ChannelSpec::new(Seconds(converter.delay), converter.filter.clone())
         };
         Spec {
-            ratio: self.ratio,
-            latency: Some(self.latency),
             channels: self.converters.iter().map(channel).collect(),
             design: DesignSpec::new(Method::H2, self.taps),
-            target: self.target.clone(),
-            ..Spec::from_toml(THESIS, "spec.toml").unwrap()
+            ..alike(&self.target, self.ratio, self.latency, &[])
         }
     }
 
     /// Rms of the error and of the noise together.
     fn rms(&self) -> f64 {
-        total(&design(&self.spec(), &DesignOptions::without_proof()).unwrap())
+        total(&designed(&self.spec()))
     }
 }
 
@@ -60,30 +58,14 @@ fn total(design: &Design) -> f64 {
     mean.rms_error.hypot(mean.output_noise)
 }
 
-const THESIS: &str = "fast_period = 1.0\nratio = 2\nlatency = 10\n\
-    target = { filter = { num = [0.25], den = [1.0, 1.0, 0.25] } }\n\
-    channel = [{ delay = 1.2 }, { delay = 0.6 }]\n";
-
 fn thesis(noise: f64, taps: Option<usize>) -> Case {
-    let filter = FilterSpec::TransferFunction { num: vec![0.25], den: vec![1.0, 1.0, 0.25] };
-    let converter = |delay| Converter { delay, noise, filter: filter.clone() };
-    Case {
-        ratio: 2,
-        latency: 10,
-        taps,
-        target: filter.clone(),
-        converters: vec![converter(1.2), converter(0.6)],
-    }
+    let converter = |delay| Converter { delay, noise, filter: thesis_filter() };
+    let converters = vec![converter(1.2), converter(0.6)];
+    Case { ratio: 2, latency: 10, taps, target: thesis_filter(), converters }
 }
 
 fn butterworth(order: usize, cutoff: f64) -> FilterSpec {
-    FilterSpec::Family {
-        family: Family::Butterworth,
-        order: Some(order),
-        passband: Passband::LowPass { cutoff: Hertz(cutoff) },
-        ripple_db: None,
-        attenuation_db: None,
-    }
+    low_pass_at(Family::Butterworth, order, cutoff)
 }
 
 /// A converter that samples every `period` fast periods, as virtual channels of the frame of `frame`.
@@ -125,11 +107,11 @@ fn check_rates(mut case: Case, converters: &[(&Converter, f64)], golden: f64) {
         .iter()
         .flat_map(|(converter, period)| virtual_channels(frame, *period, converter))
         .collect();
-    let own = design(&own_rates(&case, converters), &DesignOptions::without_proof()).unwrap();
+    let own = designed(&own_rates(&case, converters));
     let by_hand = shifted(case);
     check(&by_hand, golden);
     assert!((total(&own) - golden).abs() < 1e-10, "{} instead of {golden}", total(&own));
-    let by_hand = design(&by_hand.spec(), &DesignOptions::without_proof()).unwrap().bank;
+    let by_hand = designed(&by_hand.spec()).bank;
     assert_eq!((own.bank.latency, own.bank.channel_count()), (by_hand.latency, converters.len()));
     let (SynthesisFilters::Fir(a), SynthesisFilters::Fir(b)) = (&own.bank.filters, &by_hand.filters) else {
         panic!("taps")
@@ -236,7 +218,7 @@ fn banks_for_a_band_are_those_of_least_squares() {
              target.filter = {{ family = \"butterworth\", order = {order}, cutoff = {cutoff} }}\n"
         );
         let spec = Spec::from_toml(&text, "spec.toml").unwrap();
-        let figures = Figures::new(&design(&spec, &DesignOptions::without_proof()).unwrap().bank).unwrap();
+        let figures = Figures::new(&designed(&spec).bank).unwrap();
         let [found, spur] = [figures.snr.total_db.0, -figures.image.unwrap().db.0];
         assert!(
             (found - snr).abs() < 0.1 && (spur - image).abs() < 0.1,
@@ -257,7 +239,7 @@ fn no_other_taps_are_better() {
         let case = Case { ratio: 3, latency: 4, taps: Some(taps), target: filter.clone(), converters };
         let mut spec = case.spec();
         (spec.channels[1].gain, spec.channels[3].gain) = (-1.7, 1e-3);
-        let designed = design(&spec, &DesignOptions::without_proof()).unwrap();
+        let designed = designed(&spec);
         let least = total(&designed);
         let SynthesisFilters::Fir(best) = &designed.bank.filters else { panic!("taps") };
         for (i, n) in (0..4).flat_map(|i| (0..taps).map(move |n| (i, n))) {
@@ -310,7 +292,7 @@ fn uncertain(noise: f64, deviations: [f64; 2]) -> Design {
         reference: Some(0),
         ..UncertaintySpec::default()
     });
-    design(&spec, &DesignOptions::without_proof()).unwrap()
+    designed(&spec)
 }
 
 /// Origin as above, with cross-spectra times the characteristic functions.
@@ -321,8 +303,7 @@ fn uncertain_delays_are_averaged_over() {
         let found = mean_over_second_delay(&design, deviation);
         assert!((found - golden).abs() < 2e-10, "{deviation}: {found} {golden}");
         // One channel alone leaves 0.04988204, and the bank for exact delays far more.
-        let nominal =
-            crate::design::design(&thesis(1e-3, Some(22)).spec(), &DesignOptions::without_proof()).unwrap();
+        let nominal = designed(&thesis(1e-3, Some(22)).spec());
         let careless = mean_over_second_delay(&nominal, deviation);
         assert!(found < 0.04988204 && careless > 0.0574, "{found} {careless}");
     }
@@ -348,7 +329,7 @@ fn uncertain_delays_make_h2_fir() {
     let mut spec = thesis(1e-3, None).spec();
     spec.uncertainty =
         Some(UncertaintySpec { delay: Some(OneOrEach::Same(Seconds(0.1))), ..UncertaintySpec::default() });
-    let design = design(&spec, &DesignOptions::without_proof()).unwrap();
+    let design = designed(&spec);
     assert!(design.sizing.taps_chosen && matches!(design.bank.filters, SynthesisFilters::Fir(_)));
     spec.design.order = Some(3);
     assert!(spec.check().is_err());

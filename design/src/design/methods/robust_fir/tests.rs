@@ -1,6 +1,7 @@
 //! Robust optima against a semidefinite program, and the worst case that the file states.
 
 use crate::design::{Design, DesignOptions, RobustStudy, Study, design, norm_at};
+use crate::tests::designed;
 use hybank_core::spec::{ErrorPoint, Spec};
 use hybank_core::units::FastPeriods;
 use trials::random::Random;
@@ -19,21 +20,24 @@ fn study(design: &Design) -> RobustStudy {
     robust.clone().unwrap()
 }
 
+/// The study of a design whose largest gain is within 1e-3 of the lower bound.
+fn tight_study(design: &Design) -> RobustStudy {
+    let study = study(design);
+    let found = study.robust.largest_found;
+    assert!(study.lower <= found && study.lower > found * (1.0 - 1e-3), "{study:?}");
+    study
+}
+
 /// By an independent semidefinite program on 5 x 5 delays and 61 frequencies.
 #[test]
 fn robust_optima_are_those_of_a_semidefinite_program() {
     for (half, robust, nominal) in
         [(0.05, 0.0421756, 0.0421799), (0.1, 0.0442877, 0.0478338), (0.2, 0.0635326, 0.0682)]
     {
-        let designed = design(&thesis(half), &DesignOptions::without_proof()).unwrap();
-        let study = study(&designed);
+        let designed = designed(&thesis(half));
+        let study = tight_study(&designed);
         assert!((study.robust.largest_found / robust - 1.0).abs() < 1e-3, "{study:?}");
         assert!((study.nominal.largest_found / nominal - 1.0).abs() < 1e-3, "{study:?}");
-        assert!(
-            study.lower <= study.robust.largest_found
-                && study.lower > study.robust.largest_found * (1.0 - 1e-3),
-            "{study:?}"
-        );
         assert_eq!(designed.bank.gamma.norm, Some(study.robust.nominal));
         assert!(study.robust.nominal < 1.04 * 0.039932 && study.pairs < 400, "{study:?}");
     }
@@ -47,13 +51,8 @@ fn flat_optima_are_reached_and_random_points_are_no_worse() {
     for half in [0.1, 0.2, 0.3] {
         let mut spec = thesis(half);
         spec.uncertainty.as_mut().unwrap().reference = Some(1);
-        let designed = design(&spec, &DesignOptions::without_proof()).unwrap();
-        let study = study(&designed);
-        assert!(
-            study.lower <= study.robust.largest_found
-                && study.lower > study.robust.largest_found * (1.0 - 1e-3),
-            "{study:?}"
-        );
+        let designed = designed(&spec);
+        let study = tight_study(&designed);
         assert!(study.robust.largest_found < 0.99 * study.nominal.largest_found, "{study:?}");
         for _ in 0..8 {
             let delays = vec![FastPeriods(0.0), FastPeriods(half * random.sample())];
@@ -79,10 +78,7 @@ fn the_worst_case_is_stated_and_proven() {
 #[test]
 fn a_table_without_errors_changes_nothing() {
     let plain = Spec { uncertainty: None, ..thesis(0.1) };
-    let (with, without) = (
-        design(&thesis(0.0), &DesignOptions::without_proof()).unwrap(),
-        design(&plain, &DesignOptions::without_proof()).unwrap(),
-    );
+    let (with, without) = (designed(&thesis(0.0)), designed(&plain));
     assert!(matches!(with.study, Study::Fir { robust: None, .. }));
     assert_eq!(with.bank.filters, without.bank.filters);
 }
@@ -99,12 +95,8 @@ fn peaks_beside_narrow_resonances_are_found() {
         design = { method = \"fir\", taps = 5 }\n\
         uncertainty = { delay_samples = [0.0, 0.12157, 0.0036], gain = [0.0, 0.00081, 0.03398] }\n";
     let spec = Spec::from_toml(text, "spec.toml").unwrap();
-    let study = study(&design(&spec, &DesignOptions::without_proof()).unwrap());
+    let study = tight_study(&designed(&spec));
     assert!((study.robust.largest_found / 0.671295 - 1.0).abs() < 1e-3, "{study:?}");
-    assert!(
-        study.lower <= study.robust.largest_found && study.lower > 0.999 * study.robust.largest_found,
-        "{study:?}"
-    );
 }
 
 /// Three channels of which delay, gain and cut-off may be off: 512 corners, of which a third without
@@ -119,9 +111,8 @@ fn no_corner_is_worse_than_what_was_found() {
         [uncertainty]\ndelay = [0.02518, 0.047507, 0.0625434]\ngain = [0.0242652, 0.0432963, 0.0166312]\n\
         cutoff = [0.0036178, 0.0597556, 0.0032301]\nreference = 0\n";
     let spec = Spec::from_toml(text, "spec.toml").unwrap();
-    let robust = design(&spec, &DesignOptions::without_proof()).unwrap();
-    let nominal =
-        design(&Spec { uncertainty: None, ..spec.clone() }, &DesignOptions::without_proof()).unwrap();
+    let robust = designed(&spec);
+    let nominal = designed(&Spec { uncertainty: None, ..spec.clone() });
     let study = study(&robust);
     let errors = spec.error_box().unwrap();
     let mut random = Random(3);
@@ -174,7 +165,7 @@ fn robust_designs_reach_their_bound_and_win_what_the_table_says() {
                         delays.collect::<Vec<_>>().join(", "),
                     );
                     let spec = Spec::from_toml(&text, "spec.toml").unwrap();
-                    let study = study(&design(&spec, &DesignOptions::without_proof()).unwrap());
+                    let study = study(&designed(&spec));
                     let found = study.robust.largest_found;
                     assert!(study.lower <= found && found <= 1.0012 * study.lower, "{text} {study:?}");
                     assert!(study.gain() >= 0.0, "{text} {study:?}");

@@ -1,23 +1,10 @@
 //! Every kernel on calls of a few frames against the definition. The calls are small enough for Miri
 //! (`tools/miri.sh`), which checks each load and store of the portable kernels.
 
-use hybank_runtime::{
-    Algorithm, Isa, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Precision, SampleLayout, Shape,
-    StateMatrices, Stream,
+use super::support::{FIR_ALGORITHMS, definition, fir_bank, recursive_bank, state_space_definition, worst};
+use crate::{
+    Isa, Options, PcmFormat, PcmFrames, PcmOutput, Plan, Precision, SampleLayout, StateMatrices, Stream,
 };
-
-/// y[k M + p] = sum_i sum_j f_i[p + j M] x_i[k - j].
-fn definition(taps: &[Vec<f64>], ratio: usize, input: &[f64]) -> Vec<f64> {
-    let n = taps.len();
-    let output = |t: usize| {
-        let term = |(i, f): (usize, &Vec<f64>)| {
-            let frames = 0..=t / ratio;
-            frames.filter_map(|k| f.get(t - k * ratio).map(|c| c * input[k * n + i])).sum::<f64>()
-        };
-        taps.iter().enumerate().map(term).sum()
-    };
-    (0..input.len() / n * ratio).map(output).collect()
-}
 
 /// Numbers between -1 and 1 that follow no simple rule.
 fn samples(count: usize) -> Vec<f64> {
@@ -39,13 +26,6 @@ fn run(plan: &Plan, input: &[f64]) -> Vec<f64> {
     out.split_off(plan.extra_latency())
 }
 
-fn assert_close(got: &[f64], want: &[f64], eps: f64, case: &str) {
-    assert_eq!(got.len(), want.len(), "{case}");
-    for (t, (got, want)) in got.iter().zip(want).enumerate() {
-        assert!((got - want).abs() < eps, "{case}: sample {t} is {got}, not {want}");
-    }
-}
-
 /// N and M of FIR filters. Miri takes a thousand times as long: there each number of lanes per frame and of
 /// phases once.
 fn shapes() -> Vec<(usize, usize)> {
@@ -62,13 +42,13 @@ fn fir_kernels_follow_the_definition() {
         let taps: Vec<Vec<f64>> = samples(n * 4 * m).chunks(4 * m).map(<[f64]>::to_vec).collect();
         let input = samples(n * frames);
         let want = definition(&taps, m, &input);
+        let bank = fir_bank(taps, m);
         for isa in Isa::available() {
             for (precision, eps) in [(Precision::Single, 3e-5), (Precision::Double, 1e-13)] {
-                for algorithm in [Algorithm::Direct, Algorithm::OverlapSave] {
-                    let options = Options { isa, precision, algorithm };
-                    let plan = Plan::from_taps(&taps, m, 0, options).unwrap();
-                    let case = format!("N {n} M {m} {isa} {precision:?} {algorithm:?}");
-                    assert_close(&run(&plan, &input), &want, eps, &case);
+                for algorithm in FIR_ALGORITHMS {
+                    let plan = bank.plan(Options { isa, precision, algorithm }).unwrap();
+                    let error = worst(&want, &run(&plan, &input));
+                    assert!(error < eps, "N {n} M {m} {isa} {precision:?} {algorithm:?}: {error:e}");
                 }
             }
         }
@@ -86,17 +66,12 @@ fn recursions_follow_the_definition() {
         let filter =
             StateMatrices { a: (0..3).map(row).collect(), b: matrix(3, 2), c: matrix(2, 3), d: matrix(2, 2) };
         let input = samples(2 * 70);
-        let mut want = Vec::new();
-        let mut x = [0.0; 3];
-        let product = |row: &[f64], v: &[f64]| row.iter().zip(v).map(|(a, b)| a * b).sum::<f64>();
-        for u in input.chunks(2) {
-            want.extend((0..2).map(|p| product(&filter.c[p], &x) + product(&filter.d[p], u)));
-            x = std::array::from_fn(|i| product(&filter.a[i], &x) + product(&filter.b[i], u));
-        }
+        let want = state_space_definition(&filter, &input);
+        let bank = recursive_bank(filter);
         for isa in Isa::available() {
-            let options = Options { isa, ..Options::default() };
-            let plan = Plan::from_state_space(&filter, Shape { channels: 2, ratio: 2 }, 0, options).unwrap();
-            assert_close(&run(&plan, &input), &want, 1e-13, &format!("mixed {mixed} {isa}"));
+            let plan = bank.plan(Options { isa, ..Options::default() }).unwrap();
+            let error = worst(&want, &run(&plan, &input));
+            assert!(error < 1e-13, "mixed {mixed} {isa}: {error:e}");
         }
     }
 }
@@ -104,8 +79,8 @@ fn recursions_follow_the_definition() {
 /// Bytes as they lie in files, to and from the kernels that convert them.
 #[test]
 fn pcm_follows_the_samples_in_memory() {
-    let taps = vec![vec![0.5, -0.25]; 3];
-    let plan = Plan::from_taps(&taps, 1, 0, Options { isa: Isa::portable(), ..Options::default() }).unwrap();
+    let bank = fir_bank(vec![vec![0.5, -0.25]; 3], 1);
+    let plan = bank.plan(Options { isa: Isa::portable(), ..Options::default() }).unwrap();
     for format in PcmFormat::ALL {
         let bytes: Vec<u8> = (0..3 * 21 * format.bytes()).map(|i| (i * 37 % 61) as u8).collect();
         let input: Vec<f32> =
