@@ -132,7 +132,8 @@ mod tests {
     #[test]
     fn samples_hide_also_if_they_are_hidden_themselves() {
         // 3 is hidden by 2 although 2 is hidden by 1, which is too far from 3.
-        let test = DepthTest { epsilon: 1.0, relative: 0.1, absolute: 0.0, parallax: 0.0 };
+        let test =
+            DepthTest { epsilon: 1.0, relative: 0.1, absolute: 0.0, parallax: 0.0, ..DepthTest::default() };
         let mut row = vec![sample(0.0, 1.0, 1), sample(0.9, 2.0, 2), sample(1.8, 3.0, 3)];
         assert_eq!(remove_in_row(&mut row, &test, &mut RowScratch::default()), 2);
         assert_eq!(row[0].pixel, 1);
@@ -153,7 +154,8 @@ mod tests {
 
     #[test]
     fn far_apart_and_crowded_rows() {
-        let test = DepthTest { epsilon: 0.6, relative: 0.05, absolute: 0.0, parallax: 0.0 };
+        let test =
+            DepthTest { epsilon: 0.6, relative: 0.05, absolute: 0.0, parallax: 0.0, ..DepthTest::default() };
         let mut scratch = RowScratch::default();
         let spread: Vec<Sample<1>> = (0..50).map(|i| sample(1e6 * ((i * 31) % 50) as f64, 1.0, i)).collect();
         check(&spread, &test, &mut scratch);
@@ -191,7 +193,7 @@ mod tests {
                 })
                 .collect();
             let epsilon = position(epsilon).max(0.25);
-            let test = DepthTest { epsilon, relative, absolute: 0.1, parallax };
+            let test = DepthTest { epsilon, relative, absolute: 0.1, parallax, ..DepthTest::default() };
             let mut scratch = RowScratch::default();
             check(&samples, &test, &mut scratch);
             check(&samples, &test, &mut scratch);

@@ -4,10 +4,11 @@
 //! them. One in a cluster agrees with some of them, and disagrees with what lies farther away, as a value on
 //! a thin thing does. It is rejected if no other view confirms it and one confirms what lies around it.
 
-use crate::depth::{DepthMap, JUMP, Measure, Origin};
+use crate::depth::{DepthMap, Measure, Origin};
 use crate::image::Image;
 use crate::pipeline::{Agreement, GREY_LEVELS};
 use crate::propagate::{View, Viewpoint};
+use crate::surfaces::DepthTest;
 use rayon::prelude::*;
 
 /// Differences of two values with errors are below this many of their standard deviations.
@@ -103,8 +104,8 @@ impl Parallax {
 
     #[inline]
     pub(super) fn agree(&self, a: f32, b: f32) -> bool {
-        let spread = DEVIATIONS * std::f32::consts::SQRT_2 * self.error;
-        (a - b).abs() <= (JUMP * (a.min(b) + self.offset)).max(spread)
+        let parallax = f64::from(DEVIATIONS * std::f32::consts::SQRT_2 * self.error);
+        DepthTest { parallax, ..DepthTest::default() }.joins(a, b, self.offset)
     }
 
     fn around(&self, pixel: usize, radius: usize) -> impl Iterator<Item = usize> + use<> {
