@@ -4,7 +4,6 @@
 use super::DepthTest;
 use super::grid::PlaneSearch;
 use super::points::Points;
-use crate::lanes::{largest, least};
 use crate::sample::Sample;
 
 /// The part of a sample that sorting needs: 16 bytes to move instead of 48.
@@ -20,8 +19,6 @@ pub struct RowScratch<const C: usize> {
     points: Points,
     search: PlaneSearch,
     keys: Vec<Key>,
-    sorted: Vec<Key>,
-    starts: Vec<u32>,
     survivors: Vec<Sample<C>>,
 }
 
@@ -36,54 +33,16 @@ impl<const C: usize> RowScratch<C> {
         keys.extend(visible.map(|(s, index)| Key { x: s.x, index }));
     }
 
-    /// Sorts the keys by column, equal columns in the order given. Expected O(n): a counting sort into as
-    /// many cells as there are keys, and then of the few keys in each.
+    /// Sorts the keys by column, equal columns in the order given.
     fn sort(&mut self) {
-        let n = self.keys.len();
-        if n < 2 {
-            return;
-        }
-        let none = (f64::MAX, f64::MIN);
-        let (low, high) = self.keys.iter().fold(none, |(low, high), k| (least(low, k.x), largest(high, k.x)));
-        let scale = (n - 1) as f64 / (high - low + 1.0);
-        if !(scale.is_finite() && scale > 0.0) {
-            self.keys.sort_by(|a, b| a.x.total_cmp(&b.x));
-            return;
-        }
-        let cell = |k: &Key| (((k.x - low) * scale) as usize).min(n - 1);
-        self.starts.clear();
-        self.starts.resize(n + 1, 0);
-        self.keys.iter().for_each(|k| self.starts[cell(k) + 1] += 1);
-        let mut sum = 0;
-        for start in &mut self.starts {
-            sum += *start;
-            *start = sum;
-        }
-        // All n elements are written below.
-        self.sorted.resize(n, Key::default());
-        for k in &self.keys {
-            let next = &mut self.starts[cell(k)];
-            self.sorted[*next as usize] = *k;
-            *next += 1;
-        }
-        // After the scatter starts[i] is the end of cell i.
-        let mut begin = 0;
-        for end in &self.starts[..n] {
-            let end = *end as usize;
-            if end > begin + 1 {
-                let order = |a: &Key, b: &Key| a.x.total_cmp(&b.x).then(a.index.cmp(&b.index));
-                self.sorted[begin..end].sort_unstable_by(order);
-            }
-            begin = end;
-        }
-        std::mem::swap(&mut self.sorted, &mut self.keys);
+        self.keys.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.index.cmp(&b.index)));
     }
 }
 
 /// Sorts the samples of one row by column and removes the hidden ones; returns their number.
 ///
-/// All samples count as lying on one line: their `y` is ignored. O(n log n) at worst, O(n) for
-/// typical images; the work memory grows to the longest row and is kept.
+/// All samples count as lying on one line: their `y` is ignored. O(n log n); the work memory grows to the
+/// longest row and is kept.
 pub fn remove_in_row<const C: usize>(
     samples: &mut Vec<Sample<C>>,
     test: &DepthTest,

@@ -105,7 +105,7 @@ impl<const C: usize> Stages<C> for Plane<'_> {
 
     fn remove_hidden(&self, _: &Range<usize>, mut projected: Projected) -> Visible<C> {
         let propagated = projected.count();
-        projected.share(self.shares.of_points());
+        projected.share(|view, points, range, shares| self.shares.of_points(view, points, range, shares));
         projected.remove(PlaneSearch::default().hidden(projected.points(), self.settings.depth_test()));
         let mut samples = projected.samples(self.views);
         self.shares.apply(&mut samples, projected.shares());
@@ -154,7 +154,7 @@ mod tests {
     use super::*;
     use crate::depth::{DepthMap, Measure};
     use crate::image::Image;
-    use crate::occlusion;
+    use crate::occlusion::{self, Points};
     use crate::propagate::{self, View};
     use nalgebra::Matrix3x4;
 
@@ -223,8 +223,11 @@ mod tests {
         assert!(got.report.occluded > 0);
         let renderer = Renderer::new(&views, &settings).unwrap();
         let plane = Camera::virtual_view(&renderer, &target, (40, 30)).unwrap();
-        let mut of_point = plane.shares.of_points();
-        let all = samples.iter().map(|s| of_point(s.view, [s.x, s.y], s.depth)).collect();
+        let points = Points::of(samples.iter().copied());
+        let mut all = vec![0.0; samples.len()];
+        for (i, (s, share)) in samples.iter().zip(all.chunks_mut(1)).enumerate() {
+            plane.shares.of_points(s.view, &points, i..i + 1, share);
+        }
         plane.shares.apply(&mut samples, all);
         let mut problem = PlaneProblem::<4, 1>::new((40, 30), &settings.interpolation);
         problem.add(&samples);

@@ -255,9 +255,8 @@ impl<'a, P: Viewpoint> Known<'a, P> {
             let balance = || votes(p, value).into_iter().map(Vote::count).sum::<i32>();
             match plane.is_supported(p, 1, SUPPORTERS) {
                 false => balance() <= 0,
-                // Rigs have few such values, and their medians take them to one side. Steep surfaces have
-                // some too, which no view sees through.
-                true if map.measure() == Measure::Depth && plane.is_between(p) => balance() < 0,
+                // Steep surfaces have such values too, which no view sees through.
+                true if plane.is_between(p) => balance() < 0,
                 true => self.is_in_cluster(index, p, RING, &votes),
             }
         };

@@ -57,5 +57,6 @@ fn spring(depths: &[f32; 3], joined: usize, settings: &Settings) -> (f32, f32) {
     let edge = || plane.stiffness as f32 * test.share(pair.0, pair.1) + plane.edge_stiffness as f32;
     let next = near_and_far(depths[1], depths[2]);
     let bend = || plane.bending as f32 * test.share(pair.0.min(next.0), pair.1.max(next.1));
-    (if joined > 1 { edge() } else { 0.0 }, if joined > 2 { bend() } else { 0.0 })
+    let bends = joined > 2 && plane.bending > 0.0;
+    (if joined > 1 { edge() } else { 0.0 }, if bends { bend() } else { 0.0 })
 }

@@ -29,6 +29,7 @@ fn a_rig_with_damaged_disparities() {
         (Damage::Outliers(0.05), 33.8),
         (Damage::Blobs(0.05), 33.0),
         (Damage::Flying, 32.2),
+        (Damage::Blurred, 32.0),
         (Damage::Noise(0.5), 33.9),
         (Damage::Noise(1.0), 33.4),
         (Damage::Scattered(0.03), 33.4),
