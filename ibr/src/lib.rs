@@ -22,6 +22,7 @@ pub mod restore;
 pub mod sample;
 pub mod scene;
 pub mod setting;
+mod surfaces;
 #[cfg(test)]
 #[path = "../examples/demo/synthetic.rs"]
 mod synthetic;

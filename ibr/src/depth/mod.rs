@@ -10,7 +10,7 @@ pub(crate) use fill::fill_empty_rows;
 pub use fill::fill_unknown;
 pub(crate) use fill::{NONE, for_holes};
 pub(crate) use mesh::Mesh;
-pub(crate) use relief::{JUMP, Reliefs, TILE};
+pub(crate) use relief::{Reliefs, TILE};
 
 /// The quantity that a map holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

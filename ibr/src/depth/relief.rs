@@ -3,10 +3,6 @@
 use super::{DepthMap, Measure};
 use crate::occlusion::DepthTest;
 
-/// A difference of this share of the nearer depth separates two surfaces of maps without noise: the depth
-/// test's default sigma.
-pub(crate) const JUMP: f32 = 0.05;
-
 /// Pixels of a row whose surroundings are found together.
 pub(crate) const TILE: usize = 64;
 
@@ -17,9 +13,8 @@ struct Scale {
     nearer: f32,
     /// Added to a value, it gives a positive number in proportion or inverse proportion to depth.
     offset: f32,
-    /// Share of the nearer depth, and difference of disparities, that separate two surfaces.
-    relative: f32,
-    parallax: f32,
+    measure: Measure,
+    test: DepthTest,
 }
 
 /// The surroundings of some neighbouring pixels, in the order of their columns: arrays of a fixed length,
@@ -80,19 +75,18 @@ impl DepthMap {
 
 impl Scale {
     fn of(map: &DepthMap, test: &DepthTest) -> Self {
-        let (nearer, parallax) =
-            if map.measure == Measure::Disparity { (1.0, test.parallax as f32) } else { (-1.0, 0.0) };
-        Self { nearer, offset: map.offset as f32, relative: test.relative as f32, parallax }
+        let nearer = if map.measure == Measure::Disparity { 1.0 } else { -1.0 };
+        Self { nearer, offset: map.offset as f32, measure: map.measure, test: *test }
     }
 
     /// The least difference of two values that separates their surfaces.
-    ///
-    /// Depth is proportional to 1 / D, so a difference of a share of the nearer depth is the same share of
-    /// the smaller disparity.
     #[inline(always)]
     fn jump(self, a: f32, b: f32) -> f32 {
-        let share = self.relative * ((if a < b { a } else { b }) + self.offset);
-        if share > self.parallax { share } else { self.parallax }
+        let smaller = (if a < b { a } else { b }) + self.offset;
+        match self.measure {
+            Measure::Disparity => self.test.jump(smaller),
+            Measure::Depth => self.test.sigma(f64::from(smaller)) as f32,
+        }
     }
 
     /// Mean of the differences to the neighbours on the surface of `here`; unknown neighbours have none.

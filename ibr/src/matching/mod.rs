@@ -90,34 +90,44 @@ pub fn depths<P: Viewpoint>(
         let mut sweeps: Vec<_> = photographs.iter().map(reduced).map(sweep).collect();
         (0..sweeps.len()).try_for_each(|k| Sweep::prepare(&mut sweeps, k)).map(|()| sweeps)
     };
-    let coarse = matched(&sweeps(REDUCTION)?, &vec![true; wanted.len()])?;
+    let coarse = sweeps(REDUCTION)?;
+    let needed = with_others(&coarse, wanted);
+    let found = matched(&coarse, &needed);
+    check(&found, wanted)?;
     let mut fine = sweeps(1)?;
-    fine.iter_mut().zip(&coarse).for_each(|(sweep, found)| sweep.narrow(found));
+    fine.iter_mut().zip(&found).for_each(|(sweep, found)| sweep.narrow(found));
+    let found = matched(&fine, wanted);
+    check(&found, wanted)?;
     let map = |(sweep, found): (&Sweep<P>, Vec<f32>)| {
         let data: Vec<f32> = found.into_iter().map(|v| measure.of_parallax(v)).collect();
         (!data.is_empty()).then(|| DepthMap::from_known(sweep.grey.size(), data, measure))
     };
-    Ok(fine.iter().zip(matched(&fine, wanted)?).map(map).collect())
+    Ok(fine.iter().zip(found).map(map).collect())
+}
+
+/// The wanted photographs, and those with which they are matched.
+fn with_others<P>(sweeps: &[Sweep<P>], wanted: &[bool]) -> Vec<bool> {
+    let is_other = |k: usize| sweeps.iter().zip(wanted).any(|(s, wanted)| *wanted && s.others.contains(&k));
+    (0..sweeps.len()).map(|k| wanted[k] || is_other(k)).collect()
 }
 
 /// The parallaxes of the wanted photographs, NaN where no other one has the same at the point; those of the
 /// rest are empty.
-fn matched<P: Viewpoint>(sweeps: &[Sweep<P>], wanted: &[bool]) -> Result<Vec<Vec<f32>>, MatchError> {
-    let asked = |k: usize| {
-        wanted[k] || sweeps.iter().zip(wanted).any(|(sweep, wanted)| *wanted && sweep.others.contains(&k))
+fn matched<P: Viewpoint>(sweeps: &[Sweep<P>], wanted: &[bool]) -> Vec<Vec<f32>> {
+    let each = |asked: &[bool], of: &dyn Fn(usize) -> Vec<f32>| -> Vec<Vec<f32>> {
+        (0..sweeps.len()).map(|k| if asked[k] { of(k) } else { Vec::new() }).collect()
     };
-    let of = |k: usize| if asked(k) { sweeps[k].parallaxes(sweeps) } else { Vec::new() };
-    let found: Vec<Vec<f32>> = (0..sweeps.len()).map(of).collect();
-    let confirmed = (0..sweeps.len()).map(|k| {
-        if !wanted[k] {
-            return Ok(Vec::new());
-        }
-        let values = sweeps[k].confirmed(sweeps, &found, k);
-        let known = values.iter().filter(|v| !v.is_nan()).count();
-        let is_alike = known as f64 > LEAST_SHARE * values.len() as f64;
-        if is_alike { Ok(values) } else { Err(MatchError::Unlike(k)) }
-    });
-    confirmed.collect()
+    let found = each(&with_others(sweeps, wanted), &|k| sweeps[k].parallaxes(sweeps));
+    each(wanted, &|k| sweeps[k].confirmed(sweeps, &found, k))
+}
+
+/// Refuses wanted photographs of which others confirm too little.
+fn check(found: &[Vec<f32>], wanted: &[bool]) -> Result<(), MatchError> {
+    let is_unlike = |k: &usize| {
+        let known = found[*k].iter().filter(|v| !v.is_nan()).count();
+        wanted[*k] && known as f64 <= LEAST_SHARE * found[*k].len() as f64
+    };
+    (0..found.len()).find(is_unlike).map_or(Ok(()), |k| Err(MatchError::Unlike(k)))
 }
 
 /// The indices of the [`OTHERS`] smallest distances, and of fewer if there are fewer. Photographs from
@@ -138,7 +148,10 @@ impl<P: Viewpoint> Sweep<P> {
         let sweep = &sweeps[index];
         let distances: Vec<f64> = sweeps.iter().map(|other| sweep.camera.distance(&other.camera)).collect();
         let others = nearest(&distances);
-        let shift = others.iter().map(|k| sweep.shift(&sweeps[*k].camera)).fold(0.0, f64::max);
+        let shift = others
+            .iter()
+            .map(|k| sweep.camera.displacement(&sweeps[*k].camera, sweep.grey.size()))
+            .fold(0.0, f64::max);
         let pixels = |share: f64| (share * sweep.grey.width() as f64) as i32;
         let (low, widest) = match sweep.measure {
             Measure::Disparity => (-pixels(WIDEST), pixels(WIDEST)),
@@ -149,22 +162,12 @@ impl<P: Viewpoint> Sweep<P> {
         if shift > 0.0 { Ok(()) } else { Err(MatchError::Alone(index)) }
     }
 
-    /// Mean displacement in another photograph per parallax, of points that are far away.
-    fn shift(&self, other: &P) -> f64 {
-        let (width, height) = self.grey.size();
-        let map = self.camera.map_to(other);
-        let step = 1e-3 / self.camera.distance(other);
-        let [far, near] = [0.0, step].map(|parallax| f64::from(self.measure.of_parallax(parallax as f32)));
-        let shifts = [0.25, 0.5, 0.75].map(|share| {
-            let (x, y) = (share * width as f64, share * height as f64);
-            let ((a, b, _), (c, d, _)) = (map(x, y, far), map(x, y, near));
-            (c - a).hypot(d - b) / step
-        });
-        shifts.iter().sum::<f64>() / 3.0
-    }
-
+    /// Takes the range of the parallaxes that were found; without any it stays.
     fn narrow(&mut self, found: &[f32]) {
         let mut known: Vec<f32> = found.iter().map(|v| v / self.unit).filter(|v| !v.is_nan()).collect();
+        if known.is_empty() {
+            return;
+        }
         known.sort_by(f32::total_cmp);
         let stray = (STRAY * known.len() as f64) as usize;
         let (low, high) = (known[stray] - MARGIN, known[known.len() - 1 - stray] + MARGIN);

@@ -78,6 +78,14 @@ fn photographs_that_cannot_be_matched_are_named() {
     let (a, b) = (noise(), noise());
     let views = [Photograph { image: &a, camera: 0.0 }, Photograph { image: &b, camera: 1.0 }];
     assert!(matches!(depths(&views, Measure::Disparity), Err(MatchError::Unlike(_))));
+    // One that shows nothing of the others harms none that can be matched.
+    let shots = cameras().map(|camera| SyntheticScene::default().view(&camera, SIZE).0);
+    let blank = Image::filled(SIZE.0, SIZE.1, 1, 100.0);
+    let view = |image, camera| Photograph { image, camera };
+    let views = [view(&shots[0], 0.0), view(&shots[1], 1.0), view(&shots[2], 2.0), view(&blank, 9.0)];
+    let found = super::depths(&views, Measure::Disparity, &[true, false, false, false]).unwrap();
+    let alone = super::depths(&views[..3], Measure::Disparity, &[true, false, false]).unwrap();
+    assert!(found[0].is_some() && found[..3] == alone[..]);
 }
 
 /// The nearest of all, but none from nearly the same place.

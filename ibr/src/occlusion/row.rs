@@ -4,7 +4,6 @@
 use super::DepthTest;
 use super::grid::PlaneSearch;
 use super::points::Points;
-use crate::lanes::{largest, least};
 use crate::sample::Sample;
 
 /// The part of a sample that sorting needs: 16 bytes to move instead of 48.
@@ -20,8 +19,6 @@ pub struct RowScratch<const C: usize> {
     points: Points,
     search: PlaneSearch,
     keys: Vec<Key>,
-    sorted: Vec<Key>,
-    starts: Vec<u32>,
     survivors: Vec<Sample<C>>,
 }
 
@@ -36,54 +33,16 @@ impl<const C: usize> RowScratch<C> {
         keys.extend(visible.map(|(s, index)| Key { x: s.x, index }));
     }
 
-    /// Sorts the keys by column, equal columns in the order given. Expected O(n): a counting sort into as
-    /// many cells as there are keys, and then of the few keys in each.
+    /// Sorts the keys by column, equal columns in the order given.
     fn sort(&mut self) {
-        let n = self.keys.len();
-        if n < 2 {
-            return;
-        }
-        let none = (f64::MAX, f64::MIN);
-        let (low, high) = self.keys.iter().fold(none, |(low, high), k| (least(low, k.x), largest(high, k.x)));
-        let scale = (n - 1) as f64 / (high - low + 1.0);
-        if !(scale.is_finite() && scale > 0.0) {
-            self.keys.sort_by(|a, b| a.x.total_cmp(&b.x));
-            return;
-        }
-        let cell = |k: &Key| (((k.x - low) * scale) as usize).min(n - 1);
-        self.starts.clear();
-        self.starts.resize(n + 1, 0);
-        self.keys.iter().for_each(|k| self.starts[cell(k) + 1] += 1);
-        let mut sum = 0;
-        for start in &mut self.starts {
-            sum += *start;
-            *start = sum;
-        }
-        // All n elements are written below.
-        self.sorted.resize(n, Key::default());
-        for k in &self.keys {
-            let next = &mut self.starts[cell(k)];
-            self.sorted[*next as usize] = *k;
-            *next += 1;
-        }
-        // After the scatter starts[i] is the end of cell i.
-        let mut begin = 0;
-        for end in &self.starts[..n] {
-            let end = *end as usize;
-            if end > begin + 1 {
-                let order = |a: &Key, b: &Key| a.x.total_cmp(&b.x).then(a.index.cmp(&b.index));
-                self.sorted[begin..end].sort_unstable_by(order);
-            }
-            begin = end;
-        }
-        std::mem::swap(&mut self.sorted, &mut self.keys);
+        self.keys.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.index.cmp(&b.index)));
     }
 }
 
 /// Sorts the samples of one row by column and removes the hidden ones; returns their number.
 ///
-/// All samples count as lying on one line: their `y` is ignored. O(n log n) at worst, O(n) for
-/// typical images; the work memory grows to the longest row and is kept.
+/// All samples count as lying on one line: their `y` is ignored. O(n log n); the work memory grows to the
+/// longest row and is kept.
 pub fn remove_in_row<const C: usize>(
     samples: &mut Vec<Sample<C>>,
     test: &DepthTest,
@@ -132,7 +91,8 @@ mod tests {
     #[test]
     fn samples_hide_also_if_they_are_hidden_themselves() {
         // 3 is hidden by 2 although 2 is hidden by 1, which is too far from 3.
-        let test = DepthTest { epsilon: 1.0, relative: 0.1, absolute: 0.0, parallax: 0.0 };
+        let test =
+            DepthTest { epsilon: 1.0, relative: 0.1, absolute: 0.0, parallax: 0.0, ..DepthTest::default() };
         let mut row = vec![sample(0.0, 1.0, 1), sample(0.9, 2.0, 2), sample(1.8, 3.0, 3)];
         assert_eq!(remove_in_row(&mut row, &test, &mut RowScratch::default()), 2);
         assert_eq!(row[0].pixel, 1);
@@ -153,7 +113,8 @@ mod tests {
 
     #[test]
     fn far_apart_and_crowded_rows() {
-        let test = DepthTest { epsilon: 0.6, relative: 0.05, absolute: 0.0, parallax: 0.0 };
+        let test =
+            DepthTest { epsilon: 0.6, relative: 0.05, absolute: 0.0, parallax: 0.0, ..DepthTest::default() };
         let mut scratch = RowScratch::default();
         let spread: Vec<Sample<1>> = (0..50).map(|i| sample(1e6 * ((i * 31) % 50) as f64, 1.0, i)).collect();
         check(&spread, &test, &mut scratch);
@@ -191,7 +152,7 @@ mod tests {
                 })
                 .collect();
             let epsilon = position(epsilon).max(0.25);
-            let test = DepthTest { epsilon, relative, absolute: 0.1, parallax };
+            let test = DepthTest { epsilon, relative, absolute: 0.1, parallax, ..DepthTest::default() };
             let mut scratch = RowScratch::default();
             check(&samples, &test, &mut scratch);
             check(&samples, &test, &mut scratch);

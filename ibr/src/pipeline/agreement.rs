@@ -3,9 +3,10 @@
 
 use super::Exposure;
 use super::depth_errors::{self, FEWEST_POINTS, Lookups};
-use crate::depth::{DepthMap, FAR, JUMP, Measure};
+use crate::depth::{FAR, Measure};
 use crate::image::Texture;
 use crate::propagate::{View, Viewpoint, nearest};
+use crate::surfaces::DepthTest;
 use rayon::prelude::*;
 use std::fmt;
 
@@ -176,7 +177,7 @@ impl Comparison {
                     continue;
                 }
                 all.points += 1;
-                if same_depth(d as f32, there, other_map) {
+                if DepthTest::are_one_point(d as f32, there, other_map) {
                     all.matched.push([image.pixel(y * width + x), other.pixel(q)]);
                 }
             }
@@ -244,16 +245,6 @@ fn shrunk(found: f64, error: f64) -> f64 {
     found * (1.0 - part * part).max(0.0)
 }
 
-/// Up to the share of the nearer one beyond which two samples lie on different surfaces, and for disparities
-/// up to one pixel.
-pub(crate) fn same_depth(a: f32, b: f32, map: &DepthMap) -> bool {
-    let tolerance = match map.measure() {
-        Measure::Disparity => (JUMP * (a.min(b) + map.offset() as f32)).max(1.0),
-        Measure::Depth => JUMP * a.min(b),
-    };
-    (a - b).abs() <= tolerance
-}
-
 fn brightness(colour: &[f32; 3], gain: Exposure) -> f32 {
     colour.iter().zip(gain).map(|(v, g)| v * g as f32).sum::<f32>() / 3.0
 }
@@ -262,6 +253,7 @@ fn brightness(colour: &[f32; 3], gain: Exposure) -> f32 {
 mod tests {
     use super::*;
     use crate::camera::Camera;
+    use crate::depth::DepthMap;
     use crate::image::Image;
     use crate::propagate::{CalibratedView, RectifiedView};
     use crate::synthetic::{SyntheticScene, rig_camera, rig_disparity};

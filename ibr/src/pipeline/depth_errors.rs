@@ -2,15 +2,13 @@
 //! another.
 
 use crate::depth::{DepthMap, FAR, Measure};
+use crate::surfaces::DepthTest;
 
 /// Every so many pixels of a map are looked up.
 const LOOKUP_STEP: usize = 7;
 
 /// Fewest points for a verdict.
 pub(super) const FEWEST_POINTS: usize = 100;
-
-/// Largest relative difference of two depths of one surface.
-const SAME_SURFACE: f64 = 0.05;
 
 /// The median of |x| of a normal variable of deviation one, to its inverse.
 pub(crate) const DEVIATION_PER_MEDIAN: f64 = 1.4826;
@@ -46,7 +44,9 @@ impl Lookups {
             let Some((there, kept)) = interpolated(to, u, v) else { continue };
             let (difference, is_hidden) = match from.measure() {
                 Measure::Disparity => ((there - d).abs(), false),
-                Measure::Depth => ((there / d - 1.0).abs(), (there / d - 1.0).abs() > SAME_SURFACE),
+                Measure::Depth => {
+                    ((there / d - 1.0).abs(), !DepthTest::are_one_point(d as f32, there as f32, to))
+                }
             };
             if difference.is_finite() && !is_hidden {
                 all.differences.push(difference);

@@ -12,8 +12,8 @@ mod smoothing;
 pub mod uncalibrated;
 mod view_weights;
 
+pub(crate) use agreement::GREY_LEVELS;
 pub use agreement::{Agreement, PairAgreement};
-pub(crate) use agreement::{GREY_LEVELS, same_depth};
 pub(crate) use depth_errors::{DEVIATION_PER_MEDIAN, median};
 pub use exposure::Exposure;
 pub(crate) use exposure::without_drift;

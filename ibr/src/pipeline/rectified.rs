@@ -10,7 +10,7 @@ use crate::image::Image;
 use crate::interpolate::rows::{self, RowWork, nearest_depths};
 use crate::interpolate::{Cover, HoleCount};
 use crate::occlusion::{self, RowScratch};
-use crate::propagate::{self, Frame, RectifiedView, RigCamera};
+use crate::propagate::{self, Frame, RectifiedView, RigCamera, Viewpoint};
 use crate::sample::Dropped;
 use crate::setting::FINITE;
 use rayon::prelude::*;
@@ -50,7 +50,11 @@ impl Geometry for f64 {
         let mut view_weights = ViewWeights::of(views, position)
             .nearest(settings.nearest.unwrap_or(SHARING))
             .with_noise(agreement);
-        let settings = settings.suited_to(agreement, &view_weights, Measure::Disparity);
+        let mut settings = settings.suited_to(agreement, &view_weights, Measure::Disparity);
+        let used = view_weights.views().into_iter().map(|view| views[view].camera);
+        let (test, size) = (&mut settings.interpolation.depth_test, views[0].image.size());
+        *test =
+            test.over(used.map(|camera| camera.displacement(position, size)).fold(f64::INFINITY, f64::min));
         if !settings.keep_exposure {
             view_weights = view_weights.with_gains(&agreement.gains);
         }

@@ -37,7 +37,7 @@ impl RenderSettings {
         let differs = 3.0 * (2.0 * mean_square_error(agreement, view_weights)).sqrt();
         match measure {
             Measure::Disparity => test.parallax = test.parallax.max(differs),
-            Measure::Depth => test.relative = test.relative.max(differs),
+            Measure::Depth => test.noise = test.noise.max(differs),
         }
         if self.keep_smoothing {
             return settings;

@@ -118,7 +118,7 @@ impl ViewWeights {
     /// The weight of a view where it would have this one without noise.
     pub(super) fn noisy(&self, view: u16, weight: f64) -> f32 {
         let excess = self.excess.get(usize::from(view)).copied().unwrap_or(0.0);
-        (1.0 / (1.0 / weight + excess)) as f32
+        (if excess > 0.0 { 1.0 / (1.0 / weight + excess) } else { weight }) as f32
     }
 
     /// The same with factors for the colours of the views, with which all have those of the first. As far as

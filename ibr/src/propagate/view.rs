@@ -1,7 +1,7 @@
 //! Views: photographs with their maps and cameras.
 
 use crate::camera::Camera;
-use crate::depth::DepthMap;
+use crate::depth::{DepthMap, FAR};
 use crate::image::Image;
 use nalgebra::Vector3;
 
@@ -37,6 +37,10 @@ pub trait Viewpoint: Copy + Send + Sync {
     /// The map of pixels with the numbers of their map from this camera to another one.
     fn map_to(&self, other: &Self) -> impl Fn(f64, f64, f64) -> (f64, f64, f64) + Sync;
 
+    /// Mean displacement in pixels per parallax, disparity or reciprocal depth, at another camera of points
+    /// that are far away; 0 at the same place.
+    fn displacement(&self, other: &Self, size: (usize, usize)) -> f64;
+
     /// The camera of the photograph with one pixel for `by` x `by`, and with the same numbers of the map.
     fn reduced(&self, by: usize) -> Self;
 }
@@ -61,6 +65,10 @@ impl Viewpoint for f64 {
         move |x, y, disparity| (x + shift * disparity, y, disparity)
     }
 
+    fn displacement(&self, other: &Self, _: (usize, usize)) -> f64 {
+        (self - other).abs()
+    }
+
     fn reduced(&self, by: usize) -> Self {
         self / by as f64
     }
@@ -74,6 +82,18 @@ impl Viewpoint for Camera {
     fn map_to(&self, other: &Self) -> impl Fn(f64, f64, f64) -> (f64, f64, f64) + Sync {
         let map = self.relative_to(other);
         move |x, y, depth| map.map(x, y, depth)
+    }
+
+    fn displacement(&self, other: &Self, size: (usize, usize)) -> f64 {
+        let map = self.relative_to(other);
+        // Of points so far away that depth does not turn their displacement.
+        let depth = 1e3 * self.distance(other);
+        let moved = |share: f64| {
+            let (x, y) = (share * size.0 as f64, share * size.1 as f64);
+            let ((a, b, _), (c, d, _)) = (map.map(x, y, f64::from(FAR)), map.map(x, y, depth));
+            (c - a).hypot(d - b) * depth
+        };
+        if depth > 0.0 { [0.25, 0.5, 0.75].map(moved).iter().sum::<f64>() / 3.0 } else { 0.0 }
     }
 
     fn reduced(&self, by: usize) -> Self {

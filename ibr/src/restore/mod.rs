@@ -51,6 +51,9 @@ pub fn restore<P: Viewpoint>(views: &[View<'_, P>]) -> Vec<Restored> {
         let (mut plane, count) = (all.planes[i].clone(), rejected.iter().filter(|r| **r).count());
         if count > 0 {
             plane.replace(view.image, &rejected);
+            if view.map.measure() == Measure::Disparity {
+                plane.sharpen(view.image, &rejected);
+            }
         }
         if is_noticeable(views, i, error) {
             plane.smooth(view.image, view.map.measure());

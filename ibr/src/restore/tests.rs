@@ -163,6 +163,26 @@ fn outliers_of_depths_are_found() {
     }
 }
 
+/// Means of five columns give most pixels beside an edge a value of neither side.
+#[test]
+fn blurred_outlines_become_sharp() {
+    let shots = shots();
+    let maps = shots.each_ref().map(|shot| {
+        let (map, width) = (&shot.disparity, SIZE.0);
+        let at = |p: usize, k: usize| map.row(p / width)[(p % width + k).saturating_sub(2).min(width - 1)];
+        let mean = |p: usize| (0..5).map(|k| at(p, k)).sum::<f32>() / 5.0;
+        DepthMap::new(SIZE, (0..map.data().len()).map(mean).collect(), 1.0, Measure::Disparity).unwrap()
+    });
+    for ((shot, map), restored) in shots.iter().zip(&maps).zip(restored(&shots, &maps)) {
+        let wrong = |map: &DepthMap| {
+            let pairs = map.data().iter().zip(shot.disparity.data());
+            pairs.filter(|(found, exact)| (*found - *exact).abs() > 0.5).count()
+        };
+        let (before, after) = (wrong(map), wrong(&restored.map));
+        assert!(before > 300 && 3 * after < 2 * before, "{before} {after}");
+    }
+}
+
 /// Noise of the same deviation in both maps, which the lookups measure, falls to less than a third.
 #[test]
 fn noise_is_removed() {

@@ -55,9 +55,10 @@ impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
         let (width, height) = self.size;
         let half = reach(s.spacing);
         let range = |centre: f64, length: usize| {
-            // Casts cut toward zero; rounding functions are library calls on baseline x86-64. A pixel too
-            // many fails the test of the distance below.
-            let (low, end) = ((centre - half).max(0.0) as usize, (centre + half).max(0.0) as usize + 1);
+            // Casts cut toward zero, by way of 32 bits; rounding functions are library calls on baseline
+            // x86-64, and other casts take several instructions.
+            let (start, end) = ((centre - half).max(0.0), (centre + half).max(0.0) as u32 as usize + 1);
+            let low = start as u32 as usize + usize::from(start > f64::from(start as u32));
             low.min(length)..end.min(length)
         };
         let columns = range(s.x, width);
@@ -72,7 +73,7 @@ impl<'a, const ORDER: usize, const C: usize> Part<'a, ORDER, C> {
                 }
             }
         }
-        let (column, row) = ((s.x + 0.5) as usize, (s.y + 0.5) as usize);
+        let (column, row) = ((s.x + 0.5) as u32 as usize, (s.y + 0.5) as u32 as usize);
         let count = &mut self.counts[row.min(height - 1) * width + column.min(width - 1) - self.first];
         *count = count.saturating_add(1);
     }

@@ -2,7 +2,6 @@
 
 use super::grid::Grid;
 use crate::interpolate::Settings;
-use crate::occlusion::DepthTest;
 use hybank_sampling::Fit2;
 use hybank_sampling::fit2::{Convergence, Direction, Iteration, Springs};
 
@@ -55,21 +54,9 @@ fn spring(depths: &[f32; 3], joined: usize, settings: &Settings) -> (f32, f32) {
     // An unknown depth equals the other one.
     let near_and_far = |a: f32, b: f32| (a.min(b), a.max(b));
     let pair = near_and_far(depths[0], depths[1]);
-    let edge = || plane.stiffness as f32 * share(pair.0, pair.1, test) + plane.edge_stiffness as f32;
+    let edge = || plane.stiffness as f32 * test.share(pair.0, pair.1) + plane.edge_stiffness as f32;
     let next = near_and_far(depths[1], depths[2]);
-    let bend = || plane.bending as f32 * share(pair.0.min(next.0), pair.1.max(next.1), test);
-    (if joined > 1 { edge() } else { 0.0 }, if joined > 2 { bend() } else { 0.0 })
-}
-
-/// 1 / (1 + (D / sigma)^2) for the range D of some depths and the sigma of the depth test.
-#[inline]
-fn share(near: f32, far: f32, test: &DepthTest) -> f32 {
-    let range = far - near;
-    if range > 0.0 {
-        let sigma = test.relative as f32 * near + test.absolute as f32;
-        sigma * sigma / (sigma * sigma + range * range)
-    } else {
-        // One depth, or none is known.
-        1.0
-    }
+    let bend = || plane.bending as f32 * test.share(pair.0.min(next.0), pair.1.max(next.1));
+    let bends = joined > 2 && plane.bending > 0.0;
+    (if joined > 1 { edge() } else { 0.0 }, if bends { bend() } else { 0.0 })
 }

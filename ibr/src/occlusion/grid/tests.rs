@@ -41,7 +41,8 @@ fn empty_single_and_coinciding() {
 
 #[test]
 fn exactly_on_the_circle_counts() {
-    let test = DepthTest { epsilon: 5.0, relative: 0.0, absolute: 1.0, parallax: 0.0 };
+    let test =
+        DepthTest { epsilon: 5.0, relative: 0.0, absolute: 1.0, parallax: 0.0, ..DepthTest::default() };
     let mut pair = vec![sample(0.0, 0.0, -3.0), sample(3.0, 4.0, -2.0), sample(3.0, 4.1, -2.0)];
     assert_eq!(remove(&mut pair, &test), 1);
     assert_eq!(pair.len(), 2);
@@ -83,11 +84,11 @@ proptest! {
                 Sample { spacing, origin, ..sample(position(*x), position(*y), depth) }
             })
             .collect();
-        check(&samples, &DepthTest { epsilon: position(epsilon).max(0.5), relative, absolute: 0.1, parallax });
+        check(&samples, &DepthTest { epsilon: position(epsilon).max(0.5), relative, absolute: 0.1, parallax, ..DepthTest::default() });
         // Signed keys, as chi gives them, with an absolute threshold.
         let signed: Vec<Sample<1>> =
             samples.iter().map(|s| Sample { depth: s.depth + lift, ..*s }).collect();
-        check(&signed, &DepthTest { epsilon, relative: 0.0, absolute: 0.5, parallax: 0.0 });
+        check(&signed, &DepthTest { epsilon, relative: 0.0, absolute: 0.5, parallax: 0.0, ..DepthTest::default() });
     }
 
     /// Samples that only hide others, places without a sample, and memory used before.
@@ -103,7 +104,7 @@ proptest! {
                 _ => Sample { spacing: *spacing, ..sample(*x, *y, *d) },
             })
             .collect();
-        let test = DepthTest { epsilon, relative, absolute: 0.1, parallax: 0.0 };
+        let test = DepthTest { epsilon, relative, absolute: 0.1, parallax: 0.0, ..DepthTest::default() };
         let mut points = Points::of(samples.iter().copied());
         raw.iter().enumerate().for_each(|(i, s)| points.own[i] = s.4 > 1);
         let own = |i: &usize| points.own[*i];

@@ -7,6 +7,7 @@ use crate::depth::{Origin, Reliefs, TILE, or_far};
 use crate::occlusion::{DepthTest, Points, RUN};
 use crate::propagate::{DOUBTFUL_WEIGHT, GUESSED_WEIGHT, spacing, weight};
 use crate::sample::Sample;
+use std::ops::Range;
 
 /// The pixels of some tiles at their places in the virtual image, view by view and row by row.
 #[derive(Debug, Clone, Default)]
@@ -90,15 +91,15 @@ impl Projected {
         places.iter().for_each(|i| self.points.own[*i as usize] = false);
     }
 
-    /// Gives each pixel the share of its view in its place; what has hardly any hides nothing.
-    pub(crate) fn share(&mut self, mut share: impl FnMut(u16, [f64; 2], f32) -> f32) {
+    /// Gives each pixel the share of its view in its place, by `share` for the places of a tile; what has
+    /// hardly any hides nothing.
+    pub(crate) fn share(&mut self, share: impl Fn(u16, &Points, Range<usize>, &mut [f32])) {
         let Self { points, tiles, shares, .. } = self;
         let ends = tiles.iter().skip(1).map(|next| next.first_place).chain([points.len()]);
         for (tile, end) in tiles.iter().zip(ends) {
-            for i in (tile.first_place..end).filter(|i| !points.x[*i].is_nan()) {
-                shares[i] = share(tile.view, [points.x[i], points.y[i]], points.depth[i]);
-                points.hides[i] &= shares[i] > LEAST_SHARE;
-            }
+            let places = tile.first_place..end;
+            share(tile.view, points, places.clone(), &mut shares[places.clone()]);
+            places.for_each(|i| points.hides[i] &= shares[i] > LEAST_SHARE);
         }
     }
 

@@ -2,8 +2,8 @@
 
 use super::super::Frame;
 use crate::camera::Relative;
-use crate::depth::JUMP;
 use crate::occlusion::LARGEST_SPACING;
+use crate::surfaces::JUMP;
 
 /// Least depth at the virtual camera for which the corners of a tile say where its pixels fall, as a share
 /// of the largest one.

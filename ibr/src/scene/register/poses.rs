@@ -9,9 +9,9 @@ use super::{BETTER, LEAST, Shown, Sighting, middle, slope, step_of, weighed};
 use crate::camera::Camera;
 use crate::depth::FAR;
 use crate::image::Image;
-use crate::pipeline::same_depth;
 use crate::propagate::Viewpoint;
 use crate::scene::SourceView;
+use crate::surfaces::DepthTest;
 use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix4, Rotation3, SVector, Vector3};
 use rayon::prelude::*;
 
@@ -77,7 +77,8 @@ fn sightings(
         }
         let (u, v, there) = map.map(x as f64, y as f64, f64::from(depth));
         let q = other.image.pixel_at(u, v)?;
-        let is_shown = !other.map.is_guessed(q) && same_depth(there as f32, other.map.data()[q], &other.map);
+        let is_shown = !other.map.is_guessed(q)
+            && DepthTest::are_one_point(there as f32, other.map.data()[q], &other.map);
         let values = [greys[from].data()[p], greys[to].value_at(u, v, 0)];
         let slope = slope(&greys[to], u, v);
         let point = cameras[from].unproject(x as f64, y as f64, f64::from(depth));

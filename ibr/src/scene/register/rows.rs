@@ -3,9 +3,9 @@
 use super::{BETTER, LEAST, Shown, Sighting, middle, slope, step_of, weighed};
 use crate::depth::Origin;
 use crate::image::{Image, cubic_weights};
-use crate::pipeline::same_depth;
 use crate::propagate::{Viewpoint, nearest};
 use crate::scene::SourceView;
+use crate::surfaces::DepthTest;
 
 const ROUNDS: usize = 8;
 
@@ -69,7 +69,7 @@ fn sightings(
         let (u, v, there) = map(x as f64, y as f64, f64::from(view.map.row(y)[x]));
         let v = v + shift;
         let q = other.image.pixel_at(u, v)?;
-        let is_shown = same_depth(there as f32, other.map.data()[q], &other.map);
+        let is_shown = DepthTest::are_one_point(there as f32, other.map.data()[q], &other.map);
         let (value, slope) = (greys[to].value_at(u, v, 0), slope(&greys[to], u, v));
         let values = [greys[from].data()[y * width + x], value];
         let is_shown = is_shown && value.is_finite() && slope[1].is_finite();

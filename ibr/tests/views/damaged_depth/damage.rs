@@ -21,6 +21,8 @@ pub(crate) enum Damage {
     /// Within two pixels of another surface a value lies anywhere between both, as that of a camera that
     /// measures the time of flight.
     Flying,
+    /// Each value is the mean of those within two rows and columns.
+    Blurred,
     /// White errors of this many pixels in the virtual view for a rig, or to the next view.
     Noise(f64),
     /// This share of the values is known, the rest is 0.
@@ -46,6 +48,7 @@ impl Damage {
             Self::Outliers(share) => format!("outliers {} %", 100.0 * share),
             Self::Blobs(share) => format!("blobs {} %", 100.0 * share),
             Self::Flying => "flying pixels".into(),
+            Self::Blurred => "blurred".into(),
             Self::Noise(pixels) => format!("noise {pixels} px"),
             Self::Scattered(share) => format!("scattered {} %", 100.0 * share),
             Self::ScatteredOutliers(share, wrong) => {
@@ -112,6 +115,7 @@ impl Damage {
         match self {
             Self::Blobs(share) => blobs(values, width, share, random, |share| low + (high - low) * share),
             Self::Flying => flying(values, width, random),
+            Self::Blurred => blurred(values, width),
             _ => {}
         }
         for value in values {
@@ -151,6 +155,9 @@ fn exposed(photograph: &Path, gains: [f64; 3], folder: &Path) -> Result<PathBuf,
     Ok(file)
 }
 
+/// Rows and columns over which values are blurred.
+const BLUR: usize = 2;
+
 /// Radius of a blob in pixels.
 const BLOB: isize = 3;
 
@@ -184,6 +191,19 @@ fn flying(values: &mut [f32], width: usize, random: &mut Pcg64) {
         if let Some(other) = others.max_by(|a, b| apart(a).total_cmp(&apart(b))).filter(|o| apart(o) > 1.1) {
             *value += (other - *value) * uniform(random) as f32;
         }
+    }
+}
+
+/// The mean of the known values within [`BLUR`] rows and columns; what is unknown stays so.
+fn blurred(values: &mut [f32], width: usize) {
+    let clean = values.to_vec();
+    let is_known = |value: &f32| value.is_finite() && *value > 0.0;
+    for (p, value) in values.iter_mut().enumerate().filter(|(_, value)| is_known(value)) {
+        let (x, y) = (p % width, p / width);
+        let row = |y: usize| &clean[y * width..][x.saturating_sub(BLUR)..(x + BLUR + 1).min(width)];
+        let rows = y.saturating_sub(BLUR)..(y + BLUR + 1).min(clean.len() / width);
+        let around: Vec<f32> = rows.flat_map(|y| row(y).iter().copied().filter(is_known)).collect();
+        *value = around.iter().sum::<f32>() / around.len() as f32;
     }
 }
 
