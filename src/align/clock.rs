@@ -1,11 +1,15 @@
 //! When the samples of a recording were taken, on the clock of the reference.
 
+use crate::instants::{Clock, Recording};
 use crate::sampling::nonuniform::Measured;
-use crate::sampling::{Known, LearnedSpline, few_readings};
+use crate::sampling::{Known, LearnedSpline, few_readings, median};
 use crate::sine_fit::Estimate;
+use crate::units::FastPeriods;
 use serde::Serialize;
 use std::ops::Range;
 
+/// Samples between two knots of a clock for fusion: its rate is constant over them.
+const KNOT_EVERY: usize = 256;
 /// Rounds in which the sample of an instant is found.
 const INVERSE_ROUNDS: usize = 5;
 
@@ -83,6 +87,38 @@ impl ClockCourse {
     /// Where samples were lost or came in.
     pub fn steps(&self) -> &[ClockStep] {
         &self.steps
+    }
+
+    /// The samples of a recording with their instants, without those amid a step. They come once in
+    /// `spacing` of those that this course counts, in units of which `ratio` are a sample of the reference.
+    pub(crate) fn recording(
+        &self,
+        mut samples: Vec<f64>,
+        channel: usize,
+        spacing: f64,
+        ratio: f64,
+    ) -> Recording {
+        let (scaled, count) = (|k: usize| (k as f64 / spacing).round() as usize, samples.len());
+        for step in &self.steps {
+            let end = scaled(step.samples.end).min(count);
+            samples[scaled(step.samples.start).min(end)..end].fill(f64::NAN);
+        }
+        let beside =
+            |step: &ClockStep| [scaled(step.samples.start).saturating_sub(1), scaled(step.samples.end)];
+        let all = (0..count).step_by(KNOT_EVERY).chain(self.steps.iter().flat_map(beside)).chain([count]);
+        let mut knots: Vec<usize> = all.collect();
+        knots.sort_unstable();
+        knots.dedup();
+        let instant = |k: &usize| (*k as f64, FastPeriods(self.at(*k as f64 * spacing) * ratio));
+        let even = || Clock::even(FastPeriods(self.at(0.0) * ratio), FastPeriods(ratio * spacing));
+        // Only steps back in time could spoil a clock, and no recorder makes them.
+        Recording::new(samples, Clock::through(knots.iter().map(instant)).unwrap_or_else(|_| even()), channel)
+    }
+
+    /// The usual deviation of the instants of so many samples: the median, because at the ends a clock is
+    /// known far worse than elsewhere.
+    pub(crate) fn usual_deviation(&self, count: usize) -> f64 {
+        median((0..count).step_by(KNOT_EVERY).map(|k| self.deviation(k as f64)).collect())
     }
 
     /// The number of a sample had none been lost before it.

@@ -10,6 +10,7 @@ mod coincidence;
 mod course;
 mod error;
 mod local;
+mod noise;
 mod path;
 mod pieces;
 mod steps;
@@ -23,6 +24,7 @@ use crate::calibrate::{
     CalibrationSettings, CalibrationSignal, CalibrationWarning, ChannelEstimate, FittedValues, LevelChange,
     LevelCourses, Reading, Record, check, check_parts, line,
 };
+use crate::figures::Alone;
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
 use crate::units::Seconds;
@@ -76,8 +78,12 @@ pub struct Alignment {
     /// By how much the gain and the offset of each channel change.
     pub changes: Vec<LevelChange>,
     /// The spec with the delays, gains and offsets, and with an uncertainty that holds the course of each
-    /// delay: or, if that is longer than a slow period, all delays of one.
+    /// delay: or, if that is longer than a slow period, all delays of one. With the band of a signal it has
+    /// its rms and the noise of the recorders.
     pub spec: Spec,
+    /// What one recorder gives, and all together, in the mean over these frames; `None` if the spec states
+    /// no band of the signal.
+    pub alone: Option<Alone>,
     /// What a reader of the values must know.
     pub warnings: Vec<AlignWarning>,
     clocks: Vec<ClockCourse>,
@@ -96,6 +102,11 @@ impl Alignment {
     /// If there is no such channel.
     pub fn instants(&self, channel: usize) -> &ClockCourse {
         &self.clocks[channel]
+    }
+
+    /// Whether a delay moves by so much that fixed taps lose by it.
+    pub fn moves(&self) -> bool {
+        self.warnings.iter().any(|warning| matches!(warning, AlignWarning::FixedTaps { .. }))
     }
 
     /// The samples of a channel, from 0, without the steps of its recording: NaN for those that are lost or
@@ -154,7 +165,9 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
     let estimates = Pieces::new(spec, &whole, &lags, fit, &stretches).measure()?;
     let few = AlignError::NotMeasured { measured: estimates.len(), pieces, reason: None };
     let course = Course::new(spec, reference, &steps, &estimates, &stretches).ok_or(few)?;
-    Ok(alignment(spec, &whole, course, &estimates, pieces))
+    let mut found = alignment(spec, &whole, course, &estimates, pieces);
+    found.measure_noise(records)?;
+    Ok(found)
 }
 
 /// The recording of channel `i` with its steps mended, and where it lies beside the reference.
@@ -211,6 +224,12 @@ impl Stretches {
     }
 }
 
+/// An offset, or 0 where it is below the rounding of the samples.
+fn without_rounding(offset: Estimate<f64>, record: &Record) -> Estimate<f64> {
+    let is_rounding = offset.value.abs() < f64::EPSILON * record.rms();
+    if is_rounding { Estimate { value: 0.0, ..offset } } else { offset }
+}
+
 fn alignment(
     spec: &Spec,
     records: &[Record],
@@ -233,7 +252,7 @@ fn alignment(
             delay: course.delay(i, &skips),
             drift: course.drift(i),
             gain: value(|found| found.gain, nominal.gain),
-            offset: value(|found| found.offset, nominal.offset),
+            offset: without_rounding(value(|found| found.offset, nominal.offset), &records[i]),
         }
     };
     let mut channels: Vec<AlignedChannel> = (0..records.len()).map(channel).collect();
@@ -263,5 +282,18 @@ fn alignment(
     let at: Vec<f64> = readings.iter().map(|reading| reading.frame as f64).collect();
     let changes = levels.changes(&at);
     let clocks = course.into_clocks();
-    Alignment { reference, channels, frames, pieces, measured, readings, changes, spec, warnings, clocks }
+    let alone = None;
+    Alignment {
+        reference,
+        channels,
+        frames,
+        pieces,
+        measured,
+        readings,
+        changes,
+        spec,
+        alone,
+        warnings,
+        clocks,
+    }
 }
