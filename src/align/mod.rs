@@ -5,6 +5,7 @@
 //! gains and offsets. A smoothing spline goes through the delays, as through any readings that are known
 //! beforehand.
 
+mod bend;
 mod clock;
 mod coincidence;
 mod course;
@@ -46,6 +47,10 @@ const SHORT_PIECE: usize = 1024;
 const LEAST_PIECES: usize = 4;
 const MOST_PIECES: usize = 1024;
 
+/// Passes in which pieces are measured: where a clock changes its rate, what it drifts within a piece is
+/// known after the first, up to a share of what it drifted before.
+const MOST_PASSES: usize = 3;
+
 /// Rms of a recording, relative to full scale, below which it holds nothing to measure by: less than half a
 /// step of 24 bits and of any converter.
 const LEAST_LEVEL: f64 = 1e-8;
@@ -72,8 +77,8 @@ pub struct Alignment {
     pub pieces: usize,
     /// Pieces that gave delays.
     pub measured: usize,
-    /// The delays over these frames, as measured; those that contradict the others are left out. Gains and
-    /// offsets that change, as smooth courses.
+    /// The delays over these frames, where they were measured and do not contradict the others. Gains and
+    /// offsets that change. All are on smooth courses.
     pub readings: Vec<Reading>,
     /// By how much the gain and the offset of each channel change.
     pub changes: Vec<LevelChange>,
@@ -157,14 +162,23 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
         false => placed(records, reference, i, within),
     };
     let placed = (0..records.len()).map(placed).collect::<Result<Vec<_>, _>>()?;
-    let lags: Vec<Lags> = placed.iter().map(|placed| placed.lags.clone()).collect();
+    let mut lags: Vec<Lags> = placed.iter().map(|placed| placed.lags.clone()).collect();
     let steps: Vec<Vec<ClockStep>> = placed.iter().map(|placed| placed.steps.clone()).collect();
     let whole: Vec<Record> = placed.into_iter().map(|placed| placed.record).collect();
     let stretches = Stretches::new(&whole, reference, &lags)?;
     let pieces = stretches.firsts().len();
-    let estimates = Pieces::new(spec, &whole, &lags, fit, &stretches).measure()?;
-    let few = AlignError::NotMeasured { measured: estimates.len(), pieces, reason: None };
-    let course = Course::new(spec, reference, &steps, &estimates, &stretches).ok_or(few)?;
+    let measured = |lags: &[Lags]| {
+        let estimates = Pieces::new(spec, &whole, lags, fit, &stretches)?.measure()?;
+        let few = AlignError::NotMeasured { measured: estimates.len(), pieces, reason: None };
+        let course = Course::new(spec, reference, &steps, &estimates, &stretches).ok_or(few)?;
+        Ok::<_, AlignError>((estimates, course))
+    };
+    let (mut estimates, mut course) = measured(&lags)?;
+    for _ in 1..MOST_PASSES {
+        let Some(better) = course.lags(&lags, &stretches) else { break };
+        lags = better;
+        (estimates, course) = measured(&lags)?;
+    }
     let mut found = alignment(spec, &whole, course, &estimates, pieces);
     found.measure_noise(records)?;
     Ok(found)

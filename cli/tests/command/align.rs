@@ -218,8 +218,8 @@ fn the_delays_over_time_are_followed() {
     assert!(followed > fixed + 20.0, "{fixed} {followed}");
 }
 
-/// Two recorders with noise whose delays pass many coincidences: `align` writes the noise, so that the SNR
-/// that is predicted is that of the output, and its last lines run as they are.
+/// Two recorders with noise whose delays drift: `align` writes the noise, so that the SNR that is predicted
+/// is that of the output, and its last lines run as they are.
 #[test]
 fn noise_is_measured_and_the_commands_that_are_named_run() {
     let spec = "fast_rate = 48000\nratio = 2\n[target]\nfilter = { family = \"butterworth\", order = 2, cutoff = 40000 }\n\
@@ -231,7 +231,7 @@ fn noise_is_measured_and_the_commands_that_are_named_run() {
     let event: Vec<f32> = (0..192_000).map(|k| (0.01 * at(k)) as f32).collect();
     wav::write(&desk, "event.wav", 1, 48_000, &event);
     let simulated = ["simulate", "spec.toml", "--source", "event.wav", "-o", "c", "--samples", "192000"];
-    desk.good(&[&simulated[..], &["--noise", "1e-3", "--drift", "0,40"]].concat());
+    desk.good(&[&simulated[..], &["--noise", "1e-3", "--delay-error", "0,10us", "--drift", "0,3"]].concat());
     let align = ["align", "spec.toml", "c/ch1.wav", "c/ch2.wav", "-o", "aligned.toml"];
     let report = desk.report(&[&align[..], &["--trim", "cut"]].concat());
     let spec = hybank::spec::Spec::from_toml(&crate::support::text(&desk.read("aligned.toml")), "a").unwrap();
