@@ -6,7 +6,7 @@ use super::calibrate_report::{Interval, interval, level_changes, periods, shown}
 use super::capture_args::{CaptureArgs, check_stdin};
 use super::capture_file::{start, unread};
 use super::file_kind::FileKind;
-use super::print::{Failure, check_json, failed, failed_at, is_dash, say_understood, show, warn};
+use super::print::{Failure, check_json, failed, failed_at, is_dash, say_understood, shell_word, show, warn};
 use super::written::{Mono, begin_file, begin_recording, check_together, write_text, write_together};
 use hybank::align::{AlignError, AlignSettings, Alignment, ClockStep, align};
 use hybank::calibrate::{CalibrateError, LevelChange, Record};
@@ -100,12 +100,14 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     });
     // What the recordings have may explain why they do not fit; a report has these warnings.
     let (found, recordings) = found.inspect_err(|_| warnings.iter().for_each(|text| warn(text)))?;
-    let alone = Alone::new(&found.spec).map_err(failed)?;
+    let alone = found.alone.map_or_else(|| Alone::new(&found.spec), Ok).map_err(failed)?;
     let written = file.with_values(&text, &found.spec, &args.output).map_err(|problem| {
         Failure::Input(format!("the values found make no spec: {problem}; nothing was written"))
     })?;
     args.write(&written, &found, &recordings, &others)?;
-    AlignReport::new(&spec, &found, alone, warnings).print(&args.output, &others, args.json)
+    let mut report = AlignReport::new(&spec, &found, alone, warnings);
+    report.next = if alone.suffices() { Vec::new() } else { args.next(&found, recordings.rate) };
+    report.print(&args.output, &others, args.json)
 }
 
 impl Args {
@@ -167,6 +169,34 @@ impl Args {
         Ok(AlignSettings { reference: reference(self.reference, spec)?, within })
     }
 
+    /// The commands that make one recording of these. Delays that move take a table of them, which needs the
+    /// band of a signal, or `merge`.
+    fn next(&self, found: &Alignment, rate: f64) -> Vec<String> {
+        let word = |path: &Path| shell_word(&path.display().to_string());
+        let of = |paths: &[PathBuf]| paths.iter().map(|path| word(path)).collect::<Vec<_>>().join(" ");
+        let is_file = self.captures.iter().chain([&self.output]).all(|path| !is_dash(path));
+        let (moves, spec) = (found.moves(), &found.spec);
+        let has_band = spec.signal.as_ref().is_some_and(|signal| signal.band().is_some());
+        let is_whole = found.channels.iter().all(|channel| channel.skip == 0);
+        let (inputs, table) = match self.written(found.channels.len()).split_last() {
+            Some((drift, trimmed)) if !moves || has_band => {
+                (of(trimmed), if moves { format!(" --track {}", word(drift)) } else { String::new() })
+            }
+            None if is_whole && !moves => (of(&self.captures), String::new()),
+            _ => {
+                let command = || {
+                    let rate = rate * spec.ratio as f64;
+                    format!("hybank merge {} -o merged.wav --rate {rate}Hz", of(&self.captures))
+                };
+                let is_one_each = self.captures.len() == found.channels.len();
+                return (is_file && is_one_each).then(command).into_iter().collect();
+            }
+        };
+        let design = format!("hybank design {} -o bank.json", word(&self.output));
+        let fuse = format!("hybank fuse bank.json {inputs} -o fused.wav{table}");
+        if is_file { vec![design, fuse] } else { Vec::new() }
+    }
+
     /// Writes all outputs, which appear together; `others` are those beside the spec.
     fn write(
         &self,
@@ -223,6 +253,10 @@ struct AlignReport {
     /// What one recorder gives, and all of them together.
     alone: Alone,
     one_suffices: bool,
+    /// Whether delays move so much that fixed taps lose by it.
+    moves: bool,
+    /// The commands that make one recording of all; none where one recorder suffices.
+    next: Vec<String>,
     warnings: Vec<String>,
 }
 
@@ -274,6 +308,8 @@ impl AlignReport {
             channels: (0..found.channels.len()).map(|i| ChannelAlignment::new(spec, i, found)).collect(),
             alone,
             one_suffices: alone.suffices(),
+            moves: found.moves(),
+            next: Vec::new(),
             warnings,
         }
     }
@@ -287,8 +323,8 @@ impl AlignReport {
     fn text(&self, output: &Path, others: &[PathBuf]) -> String {
         let Self { frames, reference, pieces, measured, .. } = self;
         let mut text = format!(
-            "{frames} frames in common, {measured} of {pieces} pieces measured, relative to channel {reference}:\n  \
-             channel    cut off     delay (fast periods)      drift (ppm)               gain                      offset\n"
+            "{frames} frames in common, {measured} of {pieces} pieces measured, relative to channel {reference}, delays in fast periods:\n  \
+             channel    cut off     delay, first frame        drift (ppm)               gain                      offset\n"
         );
         for channel in &self.channels {
             let ChannelAlignment { channel, skip, delay_samples, drift_ppm, gain, offset, .. } = channel;
@@ -311,6 +347,15 @@ impl AlignReport {
         );
         for path in others.iter().map(PathBuf::as_path).chain([output]) {
             let _ = writeln!(text, "{}", path.display());
+        }
+        if self.moves {
+            text.push_str(
+                "its delays are the middle of each course, or those of the given spec where the course is longer than a \
+                 slow period; its [uncertainty] holds the course\n",
+            );
+        }
+        for command in &self.next {
+            let _ = writeln!(text, "next       {command}");
         }
         text
     }

@@ -43,7 +43,7 @@ pub use fusion::{Fused, FusionSettings, fuse};
 pub use heldout::{HeldOut, Trials};
 pub use learned::learned;
 pub use live::LiveFusion;
-pub use model::{Model, Prior};
+pub use model::{Model, PASSES, Prior, Response};
 pub use recording::Recording;
 pub use signals::{Converter, Signals};
 pub use spectrum::{Node, Spectrum};

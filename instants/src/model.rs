@@ -12,6 +12,8 @@ use hybank_core::units::{CyclesPerFastPeriod, FastPeriods};
 use hybank_linalg::{Complex, LinalgError};
 use std::ops::Range;
 
+/// Passes in which a spectrum is learned; a third gains nothing.
+pub const PASSES: usize = 2;
 /// Parts of the run from which the spectrum is learned, and outputs of each.
 const PARTS: usize = 48;
 const OUTPUTS_OF_PART: usize = 2048;
@@ -37,7 +39,7 @@ const LEAST_GAIN: f64 = 0.3;
 /// chance.
 const SIGNIFICANT: f64 = 6.6;
 
-/// A signal with its recorders, whose front ends are equal and flat.
+/// A signal with its recorders.
 #[derive(Debug, Clone)]
 pub struct Model {
     /// S.
@@ -56,11 +58,17 @@ struct Judged {
     model: Model,
 }
 
+/// A response at a frequency.
+pub type Response<'a> = &'a dyn Fn(CyclesPerFastPeriod) -> Complex<f64>;
+
 /// What is known of recordings before they are looked at.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Prior {
-    /// The end of the signal's band; measured if `None`.
-    pub band: Option<CyclesPerFastPeriod>,
+#[derive(Clone)]
+pub struct Prior<'a> {
+    /// The signal's band; measured if `None`.
+    pub band: Option<Range<CyclesPerFastPeriod>>,
+    /// The front end of each recorder over that of the target, whose output is the signal; 1 for those
+    /// beyond the end.
+    pub front_ends: &'a [Response<'a>],
     /// How often the spectrum is learned from the result; 0 keeps it flat over the band.
     pub passes: usize,
     /// The gain of each recording.
@@ -86,7 +94,7 @@ impl Model {
     /// [`LinalgError::NotPositiveDefinite`] for samples that are given twice.
     pub fn learn(
         recordings: &[Recording],
-        prior: &Prior,
+        prior: &Prior<'_>,
         settings: FusionSettings,
     ) -> Result<Self, LinalgError> {
         let longest = settings.longest(recordings);
@@ -109,7 +117,7 @@ impl Model {
     /// best.
     fn best(
         recordings: &[Recording],
-        prior: &Prior,
+        prior: &Prior<'_>,
         settings: FusionSettings,
         power: f64,
         noise: &dyn Fn(f64) -> Vec<f64>,
@@ -128,8 +136,8 @@ impl Model {
             }
             Ok(best)
         };
-        if let Some(band) = prior.band {
-            return Ok(judged(Spectrum::flat(low..band, longest))?.model);
+        if let Some(band) = prior.band.clone() {
+            return Ok(judged(Spectrum::flat(band, longest))?.model);
         }
         let of_parts = |parts: u32| {
             let band = CyclesPerFastPeriod(0.5 * f64::from(parts) / f64::from(PARTS_OF_BAND));
@@ -167,16 +175,19 @@ impl Model {
         Self { spectrum: self.spectrum.clone(), power: self.power, noise, estimator }
     }
 
-    fn new(spectrum: Spectrum, power: f64, noise: Vec<f64>, prior: &Prior) -> Self {
+    fn new(spectrum: Spectrum, power: f64, noise: Vec<f64>, prior: &Prior<'_>) -> Self {
+        let flat: Response<'_> = &|_| Complex::from(1.0);
+        let responses: Vec<Response<'_>> =
+            std::iter::once(flat).chain(prior.front_ends.iter().copied()).collect();
         let converter = |i: usize| Converter {
-            front_end: 0,
+            front_end: if i < prior.front_ends.len() { i + 1 } else { 0 },
             gain: prior.gains[i],
             noise: noise[i] / power,
             delay_deviation: prior.delay_deviations[i],
             gain_deviation: prior.gain_deviations[i],
         };
         let converters = (0..noise.len()).map(converter).collect();
-        let signals = Signals::new(&spectrum, &[&|_| Complex::from(1.0)], 0, converters);
+        let signals = Signals::new(&spectrum, &responses, 0, converters);
         Self { spectrum, power, noise, estimator: Estimator::new(signals) }
     }
 
@@ -237,7 +248,7 @@ impl Model {
     fn measure_noise(
         &mut self,
         recordings: &[Recording],
-        prior: &Prior,
+        prior: &Prior<'_>,
         settings: FusionSettings,
         pass: usize,
     ) -> Result<(), LinalgError> {

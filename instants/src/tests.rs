@@ -399,6 +399,7 @@ fn recordings_tell_their_noise_and_the_error_is_as_predicted() {
     let (_, recordings) = drifting(31);
     let prior = Prior {
         band: None,
+        front_ends: &[],
         passes: 2,
         gains: vec![1.0, -0.5],
         gain_deviations: vec![0.0; 2],

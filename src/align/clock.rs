@@ -1,11 +1,16 @@
 //! When the samples of a recording were taken, on the clock of the reference.
 
+use super::bend::Bend;
+use crate::instants::{Clock, Recording};
 use crate::sampling::nonuniform::Measured;
-use crate::sampling::{Known, LearnedSpline, few_readings};
+use crate::sampling::{Known, LearnedSpline, few_readings, median};
 use crate::sine_fit::Estimate;
+use crate::units::FastPeriods;
 use serde::Serialize;
 use std::ops::Range;
 
+/// Samples between two knots of a clock for fusion: its rate is constant over them.
+const KNOT_EVERY: usize = 256;
 /// Rounds in which the sample of an instant is found.
 const INVERSE_ROUNDS: usize = 5;
 
@@ -46,6 +51,8 @@ pub struct ClockStep {
 pub struct ClockCourse {
     /// The lag over the samples with the steps mended. None for the reference.
     smooth: Option<LearnedSpline>,
+    /// What the spline lacks of them.
+    bend: Option<Bend>,
     /// By their samples.
     steps: Vec<ClockStep>,
     /// Those that were not refused, by their pieces.
@@ -55,18 +62,22 @@ pub struct ClockCourse {
 impl ClockCourse {
     /// Of the reference itself.
     pub(super) fn reference() -> Self {
-        Self { smooth: None, steps: Vec::new(), readings: Vec::new() }
+        Self { smooth: None, bend: None, steps: Vec::new(), readings: Vec::new() }
     }
 
     /// Through readings of a recording with these steps. `None` if no spline goes through them, and with
     /// those of fewer than two samples.
     pub(super) fn new(readings: Vec<ClockReading>, steps: Vec<ClockStep>) -> Option<Self> {
-        let all: Vec<Measured> = readings.iter().map(ClockReading::measured).collect();
+        let bend = Bend::of(&readings);
+        let straight = |reading: &ClockReading| {
+            ClockReading { lag: reading.lag - bend.at(reading.sample), ..*reading }.measured()
+        };
+        let all: Vec<Measured> = readings.iter().map(straight).collect();
         let (smooth, kept) = LearnedSpline::through(&all)?;
         let kept = kept.into_iter().map(|k| readings[k]);
         let readings =
             kept.map(|reading| ClockReading { deviation: reading.deviation * smooth.scale(), ..reading });
-        Some(Self { readings: readings.collect(), smooth: Some(smooth), steps })
+        Some(Self { readings: readings.collect(), smooth: Some(smooth), bend: Some(bend), steps })
     }
 
     /// The instant of a sample, in samples of the reference.
@@ -85,6 +96,38 @@ impl ClockCourse {
         &self.steps
     }
 
+    /// The samples of a recording with their instants, without those amid a step. They come once in
+    /// `spacing` of those that this course counts, in units of which `ratio` are a sample of the reference.
+    pub(crate) fn recording(
+        &self,
+        mut samples: Vec<f64>,
+        channel: usize,
+        spacing: f64,
+        ratio: f64,
+    ) -> Recording {
+        let (scaled, count) = (|k: usize| (k as f64 / spacing).round() as usize, samples.len());
+        for step in &self.steps {
+            let end = scaled(step.samples.end).min(count);
+            samples[scaled(step.samples.start).min(end)..end].fill(f64::NAN);
+        }
+        let beside =
+            |step: &ClockStep| [scaled(step.samples.start).saturating_sub(1), scaled(step.samples.end)];
+        let all = (0..count).step_by(KNOT_EVERY).chain(self.steps.iter().flat_map(beside)).chain([count]);
+        let mut knots: Vec<usize> = all.collect();
+        knots.sort_unstable();
+        knots.dedup();
+        let instant = |k: &usize| (*k as f64, FastPeriods(self.at(*k as f64 * spacing) * ratio));
+        let even = || Clock::even(FastPeriods(self.at(0.0) * ratio), FastPeriods(ratio * spacing));
+        // Only steps back in time could spoil a clock, and no recorder makes them.
+        Recording::new(samples, Clock::through(knots.iter().map(instant)).unwrap_or_else(|_| even()), channel)
+    }
+
+    /// The usual deviation of the instants of so many samples: the median, because at the ends a clock is
+    /// known far worse than elsewhere.
+    pub(crate) fn usual_deviation(&self, count: usize) -> f64 {
+        median((0..count).step_by(KNOT_EVERY).map(|k| self.deviation(k as f64)).collect())
+    }
+
     /// The number of a sample had none been lost before it.
     fn mended(&self, sample: f64) -> f64 {
         let before = self.steps.iter().take_while(|step| step.samples.end as f64 <= sample);
@@ -93,14 +136,18 @@ impl ClockCourse {
 
     /// By how much a sample of the mended recording is larger than its instant.
     pub(super) fn lag(&self, mended: f64) -> f64 {
-        self.smooth.as_ref().map_or(0.0, |smooth| smooth.value(mended))
+        self.smooth.as_ref().map_or(0.0, |smooth| smooth.value(mended)) + self.bent(mended)
     }
 
     /// The same with its deviation.
     pub(super) fn known(&self, mended: f64) -> Estimate<f64> {
         let Some(smooth) = &self.smooth else { return Estimate { value: 0.0, sigma: 0.0 } };
         let Known { value, deviation } = smooth.at(mended);
-        Estimate { value, sigma: deviation }
+        Estimate { value: value + self.bent(mended), sigma: deviation }
+    }
+
+    fn bent(&self, mended: f64) -> f64 {
+        self.bend.as_ref().map_or(0.0, |bend| bend.at(mended))
     }
 
     /// The sample of the mended recording that was taken at an instant.
@@ -164,6 +211,21 @@ mod tests {
         }
         let ratio = f64::sqrt(smoothed / stated);
         assert!((0.6..1.5).contains(&ratio) && smoothed < 280.0 * 0.25 * 4e-10, "{ratio} {smoothed:e}");
+    }
+
+    /// A rate that turns round, as it does by temperature, with lags known far better than they bend between
+    /// two readings: none is refused, and the ends are as good as the middle.
+    #[test]
+    fn a_rate_that_turns_round_is_followed_to_its_ends() {
+        let lag = |k: f64| 10.0 + 4e-4 * k * (1.0 - k / 4000.0);
+        let course = ClockCourse::new(readings(200, 20, 1e-6, lag), Vec::new()).unwrap();
+        assert!((0..200).all(|piece| course.reading(piece).is_some()));
+        for k in [0.0, 20.0, 1500.0, 3960.0, 3980.0] {
+            let miss = course.at(k) - k + lag(k);
+            assert!(miss.abs() < 2e-6, "{k}: {miss:e}");
+        }
+        let straight = ClockCourse::new(readings(200, 20, 1e-6, |k| 3e-6 * k), Vec::new()).unwrap();
+        assert_eq!(straight.bent(3000.0), 0.0);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use super::clock::{ClockCourse, ClockReading, ClockStep};
 use super::pieces::PieceEstimate;
+use super::steps::Lags;
 use super::{AlignWarning, AlignedChannel, Stretches};
 use crate::calibrate::{Calibration, CalibrationWarning, ChannelEstimate, LevelCourses, Reading, applied};
 use crate::sampling::few_readings;
@@ -13,6 +14,9 @@ use crate::units::{FastPeriods, Seconds};
 const INSTANTS: u32 = 128;
 /// Half the box of a delay that passes through more than a slow period, in slow periods: all delays of one.
 const WHOLE_PERIOD: f64 = 0.5;
+/// What a delay may drift within a piece that is thought to be steady, in samples: its reading errs by a
+/// fifth of that.
+const MOST_DRIFT_OF_PIECE: f64 = 1e-3;
 /// Fixed taps bear a delay that moves by this, in fast periods.
 const NEGLIGIBLE_DELAY_CHANGE: f64 = 0.02;
 
@@ -114,6 +118,22 @@ impl<'a> Course<'a> {
         Estimate { value: value - self.cut(i, skips), sigma }
     }
 
+    /// The lags by these delays over pieces of the reference, if those that were used to measure them
+    /// drifted otherwise within a piece: then each delay is that of the loudest part of its piece.
+    pub(super) fn lags(&self, used: &[Lags], stretches: &Stretches) -> Option<Vec<Lags>> {
+        let (firsts, length) = (stretches.firsts(), stretches.length as f64);
+        let ends = || firsts.iter().map(|first| *first as f64).chain([self.end]);
+        let by = |(lags, clock): (&Lags, &ClockCourse)| lags.by(clock, ends());
+        let found: Vec<Lags> = used.iter().zip(&self.clocks).map(by).collect();
+        let apart = |(one, other): (&Lags, &Lags)| {
+            let middles = firsts.iter().map(|first| *first as f64 + 0.5 * length);
+            let drift = |at: f64| (one.rate_at(at) - other.rate_at(at)).abs() * length;
+            middles.map(drift).fold(0.0, f64::max)
+        };
+        let drifts = used.iter().zip(&found).map(apart).fold(0.0, f64::max);
+        (drifts > MOST_DRIFT_OF_PIECE).then_some(found)
+    }
+
     pub(super) fn steps(&self, i: usize) -> &[ClockStep] {
         self.clocks[i].steps()
     }
@@ -169,8 +189,8 @@ impl<'a> Course<'a> {
         Estimate { value: middle.in_fast_periods(h), sigma: FastPeriods(half / h / HALF_WIDTH) }
     }
 
-    /// The delays as measured, in frames after the cut, all later by the fast periods that were added, and
-    /// the levels there.
+    /// The delays at the pieces that were measured, in frames after the cut, all later by the fast periods
+    /// that were added, and the levels there.
     pub(super) fn readings(&self, skips: &[usize], raised: usize, levels: &LevelCourses) -> Vec<Reading> {
         let added = self.spec.fast_period * raised as f64;
         let of = |(piece, centre): (usize, &f64)| {
@@ -180,12 +200,9 @@ impl<'a> Course<'a> {
                 if i == self.reference {
                     return is_known.then(|| (self.spec.channels[i].delay + added, Seconds(0.0)));
                 }
-                let reading = clock.reading(piece)?;
-                let sample = (frame + skips[i] as u64) as f64;
-                // The reading says the same of the frame as of its own sample, beside the course.
-                let beside = self.slow_period() * (reading.lag - clock.known(reading.sample).value);
-                let delay = self.at(i, sample).value + beside - self.cut(i, skips) + added;
-                Some((delay, self.slow_period() * reading.deviation))
+                clock.reading(piece)?;
+                let Estimate { value, sigma } = self.at(i, (frame + skips[i] as u64) as f64);
+                Some((value - self.cut(i, skips) + added, sigma))
             };
             let delays: Vec<_> = self.clocks.iter().enumerate().map(delay).collect();
             let [gains, offsets] = levels.at(frame as f64);

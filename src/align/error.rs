@@ -2,6 +2,7 @@
 
 use super::clock::ClockStep;
 use crate::calibrate::{CalibrateError, CalibrationWarning};
+use crate::design::DesignError;
 use crate::units::{FastPeriods, Seconds};
 use std::ops::Range;
 
@@ -12,6 +13,9 @@ pub enum AlignError {
     /// The spec and its reference do not fit the recordings, or a front end cannot be realised.
     #[error(transparent)]
     Spec(#[from] CalibrateError),
+    /// The noise of the recorders cannot be measured.
+    #[error("the noise of the recorders cannot be measured: {0}")]
+    Noise(#[from] DesignError),
     /// Channels with rates of their own.
     #[error(
         "recordings are aligned sample by sample, so all channels need one rate; give no rates of their own"

@@ -5,11 +5,13 @@
 //! gains and offsets. A smoothing spline goes through the delays, as through any readings that are known
 //! beforehand.
 
+mod bend;
 mod clock;
 mod coincidence;
 mod course;
 mod error;
 mod local;
+mod noise;
 mod path;
 mod pieces;
 mod steps;
@@ -23,6 +25,7 @@ use crate::calibrate::{
     CalibrationSettings, CalibrationSignal, CalibrationWarning, ChannelEstimate, FittedValues, LevelChange,
     LevelCourses, Reading, Record, check, check_parts, line,
 };
+use crate::figures::Alone;
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
 use crate::units::Seconds;
@@ -43,6 +46,10 @@ const SHORT_PIECE: usize = 1024;
 /// Number of pieces.
 const LEAST_PIECES: usize = 4;
 const MOST_PIECES: usize = 1024;
+
+/// Passes in which pieces are measured: where a clock changes its rate, what it drifts within a piece is
+/// known after the first, up to a share of what it drifted before.
+const MOST_PASSES: usize = 3;
 
 /// Rms of a recording, relative to full scale, below which it holds nothing to measure by: less than half a
 /// step of 24 bits and of any converter.
@@ -70,14 +77,18 @@ pub struct Alignment {
     pub pieces: usize,
     /// Pieces that gave delays.
     pub measured: usize,
-    /// The delays over these frames, as measured; those that contradict the others are left out. Gains and
-    /// offsets that change, as smooth courses.
+    /// The delays over these frames, where they were measured and do not contradict the others. Gains and
+    /// offsets that change. All are on smooth courses.
     pub readings: Vec<Reading>,
     /// By how much the gain and the offset of each channel change.
     pub changes: Vec<LevelChange>,
     /// The spec with the delays, gains and offsets, and with an uncertainty that holds the course of each
-    /// delay: or, if that is longer than a slow period, all delays of one.
+    /// delay: or, if that is longer than a slow period, all delays of one. With the band of a signal it has
+    /// its rms and the noise of the recorders.
     pub spec: Spec,
+    /// What one recorder gives, and all together, in the mean over these frames; `None` if the spec states
+    /// no band of the signal.
+    pub alone: Option<Alone>,
     /// What a reader of the values must know.
     pub warnings: Vec<AlignWarning>,
     clocks: Vec<ClockCourse>,
@@ -96,6 +107,11 @@ impl Alignment {
     /// If there is no such channel.
     pub fn instants(&self, channel: usize) -> &ClockCourse {
         &self.clocks[channel]
+    }
+
+    /// Whether a delay moves by so much that fixed taps lose by it.
+    pub fn moves(&self) -> bool {
+        self.warnings.iter().any(|warning| matches!(warning, AlignWarning::FixedTaps { .. }))
     }
 
     /// The samples of a channel, from 0, without the steps of its recording: NaN for those that are lost or
@@ -146,15 +162,26 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
         false => placed(records, reference, i, within),
     };
     let placed = (0..records.len()).map(placed).collect::<Result<Vec<_>, _>>()?;
-    let lags: Vec<Lags> = placed.iter().map(|placed| placed.lags.clone()).collect();
+    let mut lags: Vec<Lags> = placed.iter().map(|placed| placed.lags.clone()).collect();
     let steps: Vec<Vec<ClockStep>> = placed.iter().map(|placed| placed.steps.clone()).collect();
     let whole: Vec<Record> = placed.into_iter().map(|placed| placed.record).collect();
     let stretches = Stretches::new(&whole, reference, &lags)?;
     let pieces = stretches.firsts().len();
-    let estimates = Pieces::new(spec, &whole, &lags, fit, &stretches).measure()?;
-    let few = AlignError::NotMeasured { measured: estimates.len(), pieces, reason: None };
-    let course = Course::new(spec, reference, &steps, &estimates, &stretches).ok_or(few)?;
-    Ok(alignment(spec, &whole, course, &estimates, pieces))
+    let measured = |lags: &[Lags]| {
+        let estimates = Pieces::new(spec, &whole, lags, fit, &stretches)?.measure()?;
+        let few = AlignError::NotMeasured { measured: estimates.len(), pieces, reason: None };
+        let course = Course::new(spec, reference, &steps, &estimates, &stretches).ok_or(few)?;
+        Ok::<_, AlignError>((estimates, course))
+    };
+    let (mut estimates, mut course) = measured(&lags)?;
+    for _ in 1..MOST_PASSES {
+        let Some(better) = course.lags(&lags, &stretches) else { break };
+        lags = better;
+        (estimates, course) = measured(&lags)?;
+    }
+    let mut found = alignment(spec, &whole, course, &estimates, pieces);
+    found.measure_noise(records)?;
+    Ok(found)
 }
 
 /// The recording of channel `i` with its steps mended, and where it lies beside the reference.
@@ -211,6 +238,12 @@ impl Stretches {
     }
 }
 
+/// An offset, or 0 where it is below the rounding of the samples.
+fn without_rounding(offset: Estimate<f64>, record: &Record) -> Estimate<f64> {
+    let is_rounding = offset.value.abs() < f64::EPSILON * record.rms();
+    if is_rounding { Estimate { value: 0.0, ..offset } } else { offset }
+}
+
 fn alignment(
     spec: &Spec,
     records: &[Record],
@@ -233,7 +266,7 @@ fn alignment(
             delay: course.delay(i, &skips),
             drift: course.drift(i),
             gain: value(|found| found.gain, nominal.gain),
-            offset: value(|found| found.offset, nominal.offset),
+            offset: without_rounding(value(|found| found.offset, nominal.offset), &records[i]),
         }
     };
     let mut channels: Vec<AlignedChannel> = (0..records.len()).map(channel).collect();
@@ -263,5 +296,18 @@ fn alignment(
     let at: Vec<f64> = readings.iter().map(|reading| reading.frame as f64).collect();
     let changes = levels.changes(&at);
     let clocks = course.into_clocks();
-    Alignment { reference, channels, frames, pieces, measured, readings, changes, spec, warnings, clocks }
+    let alone = None;
+    Alignment {
+        reference,
+        channels,
+        frames,
+        pieces,
+        measured,
+        readings,
+        changes,
+        spec,
+        alone,
+        warnings,
+        clocks,
+    }
 }

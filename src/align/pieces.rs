@@ -7,8 +7,8 @@
 use super::steps::Lags;
 use super::{AlignError, Stretches};
 use crate::calibrate::{
-    CalibrateError, CalibrationSettings, CalibrationSignal, ChannelEstimate, Record, calibrate, longest_run,
-    steadied,
+    Acquisition, CalibrateError, CalibrationSettings, CalibrationSignal, ChannelEstimate, ChannelModel,
+    Record, calibrate_with, check, longest_run, steadied,
 };
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
@@ -34,6 +34,7 @@ pub(super) struct Pieces<'a> {
     stretches: &'a Stretches,
     /// The expected gains are those of the recordings.
     spec: Spec,
+    model: ChannelModel,
 }
 
 /// What a piece says of all channels.
@@ -55,13 +56,14 @@ impl<'a> Pieces<'a> {
         lags: &'a [Lags],
         settings: CalibrationSettings,
         stretches: &'a Stretches,
-    ) -> Self {
+    ) -> Result<Self, CalibrateError> {
         let mut spec = spec.clone();
         let (own, gain) = (records[settings.reference].rms(), spec.channels[settings.reference].gain);
         for ((channel, record), lags) in spec.channels.iter_mut().zip(records).zip(lags) {
             channel.gain = (gain * record.rms() / own).copysign(gain * lags.sign);
         }
-        Self { records, lags, settings, stretches, spec }
+        let model = ChannelModel::new(&spec)?;
+        Ok(Self { records, lags, settings, stretches, spec, model })
     }
 
     /// What each piece says, where it says anything; else why the last one does not.
@@ -102,17 +104,20 @@ impl<'a> Pieces<'a> {
         let (mut shifts, mut parts) = (Vec::new(), Vec::new());
         let middle = 0.5 * (length as f64 - 1.0);
         for ((record, lags), channel) in self.records.iter().zip(self.lags).zip(&mut spec.channels) {
-            let lag = lags.at(first as f64 + middle);
+            let (lag, rate) = (lags.at(first as f64 + middle), lags.rate_at(first as f64 + middle));
             let last = record.samples.len().saturating_sub(length) as i64;
             let begin = (first as i64 + lag.round() as i64).clamp(0, last);
             let shift = (begin - first as i64) as f64;
             channel.delay = own + slow * (lag - shift);
             shifts.push(shift);
-            parts.push(steadied(record, begin as usize, length, lags.rate));
+            parts.push(steadied(record, begin as usize, length, rate));
         }
         let (begin, frames) = longest_run(&parts);
         let parts: Vec<Record> = parts.iter().map(|part| part.part(begin..begin + frames)).collect();
-        let found = calibrate(&spec, &parts, &CalibrationSignal::Any, self.settings)?;
+        check(&spec, &parts, self.settings)?;
+        let all = [Acquisition { name: "the recordings", records: &parts }];
+        let model = self.model.with_delays(&spec);
+        let found = calibrate_with(model, &spec, &all, &CalibrationSignal::Any, self.settings)?;
         // Steadied recordings agree with their own clocks in the middle of the piece.
         let beside = begin as f64 + 0.5 * (frames as f64 - 1.0) - middle;
         let centre = first as f64 + middle + beside;
@@ -129,9 +134,11 @@ impl<'a> Pieces<'a> {
             }
             let in_samples = |periods: FastPeriods| periods.0 / spec.ratio as f64;
             let later = in_samples(delay.value - own.in_fast_periods(h));
-            let sample = first as f64 + shifts[i] + middle + (1.0 + self.lags[i].rate) * beside;
+            let rate = self.lags[i].rate_at(first as f64 + middle);
+            let sample = first as f64 + shifts[i] + middle + (1.0 + rate) * beside;
+            let bend = self.lags[i].bend_over(first as f64 + middle, frames as f64);
             let lag = Estimate {
-                value: sample - centre + later,
+                value: sample - centre + later - bend,
                 sigma: in_samples(delay.sigma).max(LEAST_DEVIATION),
             };
             all.push(Some((sample, lag)));

@@ -3,7 +3,7 @@
 //! The lags of a recording are a line with steps of whole samples. Each step is put where the samples before
 //! it fit the reference best at the one lag, and those after it at the other.
 
-use super::clock::ClockStep;
+use super::clock::{ClockCourse, ClockStep};
 use super::path::{Disagree, KnownLag, Path, PathSearch};
 use crate::calibrate::{LagLine, Record, interpolated, stretch};
 use crate::sampling::median;
@@ -37,6 +37,14 @@ pub(super) struct Lags {
     pub(super) rate: f64,
     /// -1 for the opposite polarity.
     pub(super) sign: f64,
+    /// Whether the lags are so exact that those in a row say by how much they grow there.
+    is_exact: bool,
+}
+
+/// By how much lags grow per sample around one.
+struct Slope {
+    at: f64,
+    rate: f64,
 }
 
 impl Lags {
@@ -49,12 +57,49 @@ impl Lags {
         let (at, lag) = (mean(|known| known.at), mean(|known| known.lag));
         let squares: f64 = known.iter().map(|known| (known.at - at).powi(2)).sum();
         let rate = known.iter().map(|known| (known.at - at) * (known.lag - lag)).sum::<f64>() / squares;
-        Self { known, rate, sign: path.sign }
+        Self { known, rate, sign: path.sign, is_exact: false }
     }
 
     /// Of the reference itself.
     pub(super) fn none() -> Self {
-        Self { known: [0.0, 1.0].map(|at| KnownLag { at, lag: 0.0 }).to_vec(), rate: 0.0, sign: 1.0 }
+        Self {
+            known: [0.0, 1.0].map(|at| KnownLag { at, lag: 0.0 }).to_vec(),
+            rate: 0.0,
+            sign: 1.0,
+            is_exact: false,
+        }
+    }
+
+    /// Those of the same recording by its clock, known at instants of the reference.
+    pub(super) fn by(&self, clock: &ClockCourse, instants: impl Iterator<Item = f64>) -> Self {
+        let known = instants.map(|at| KnownLag { at, lag: clock.sample_at(at) - at }).collect();
+        Self { known, is_exact: true, ..*self }
+    }
+
+    /// By how much the lag grows per sample around a sample of the reference.
+    pub(super) fn rate_at(&self, sample: f64) -> f64 {
+        if self.is_exact { self.slope(self.segment(sample)).rate } else { self.rate }
+    }
+
+    /// What the mean of the lags over so many samples is above the one in their middle: the lags bend.
+    pub(super) fn bend_over(&self, sample: f64, length: f64) -> f64 {
+        let segment = self.segment(sample);
+        let (first, last) = (segment.max(2) - 1, (segment + 1).min(self.known.len() - 1));
+        if !self.is_exact || first == last {
+            return 0.0;
+        }
+        let (before, after) = (self.slope(first), self.slope(last));
+        (after.rate - before.rate) / (after.at - before.at) * length * length / 24.0
+    }
+
+    /// The later one of the two known lags between which a sample lies.
+    fn segment(&self, sample: f64) -> usize {
+        self.known.partition_point(|known| known.at <= sample).clamp(1, self.known.len() - 1)
+    }
+
+    fn slope(&self, segment: usize) -> Slope {
+        let (a, b) = (self.known[segment - 1], self.known[segment]);
+        Slope { at: 0.5 * (a.at + b.at), rate: (b.lag - a.lag) / (b.at - a.at) }
     }
 
     /// The lag at a sample of the reference: on the line between two pieces, and on that of all beyond them.

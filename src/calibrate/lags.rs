@@ -33,7 +33,9 @@ const LEAST_ODDS: f64 = 30.0;
 /// With less the lags of other probes, which samples that are lost explain, are to be less likely: the best
 /// of many lines has high odds by chance.
 const CERTAIN_ODDS: f64 = 120.0;
-/// With more the shorter probes are not asked.
+/// One probe of so many is asked first. If all of these are on one line the others are not asked.
+const FIRST_OF: usize = 3;
+/// With more neither the other probes nor the shorter ones are asked.
 const BEYOND_DOUBT: f64 = 1000.0;
 /// Other lags with this share of the log-odds of the best ones explain the recordings as well: voices that
 /// say different things correlate far beyond chance, but at many lags.
@@ -54,6 +56,8 @@ const INTERPOLATION_MARGIN: usize = 32;
 
 /// A stretch of a recording that is looked for in another one.
 struct Probe {
+    /// Its number among all.
+    number: usize,
     /// Number of its first sample.
     first: usize,
     /// Its deviations from their mean; 0 where samples are left out.
@@ -70,7 +74,8 @@ fn probes(record: &Record, longest: usize) -> Vec<Probe> {
     let loudest = |number: usize| {
         let firsts =
             (number * part..=((number + 1) * part).saturating_sub(length)).step_by(length.div_ceil(2));
-        let probes = firsts.map(|first| Probe { first, samples: stretch(record, first as i64, length) });
+        let probes =
+            firsts.map(|first| Probe { number, first, samples: stretch(record, first as i64, length) });
         probes.max_by(|a, b| a.energy().total_cmp(&b.energy())).filter(|probe| probe.energy() > 0.0)
     };
     (0..parts).filter_map(loudest).collect()
@@ -181,10 +186,10 @@ struct Lag {
 }
 
 /// The likely lags of the probes of one recording in another one, `record`, `within` so many samples.
-fn lags(probes: &[Probe], record: &Record, within: f64) -> Vec<Lag> {
+fn lags(probes: &[&Probe], record: &Record, within: f64) -> Vec<Lag> {
     let Some(length) = probes.first().map(|probe| probe.samples.len()) else { return Vec::new() };
     let size = PROBES_PER_BLOCK * length;
-    let with = |probe: &Probe| (Correlation::with(&probe.samples, size), Peaks::default());
+    let with = |probe: &&Probe| (Correlation::with(&probe.samples, size), Peaks::default());
     let mut all: Vec<(Correlation, Peaks)> = probes.iter().map(with).collect();
     // A probe may reach beyond both ends of the recording.
     for first in (-(length as i64)..record.samples.len() as i64).step_by(size - length) {
@@ -194,10 +199,10 @@ fn lags(probes: &[Probe], record: &Record, within: f64) -> Vec<Lag> {
             peaks.take(&heights, first - probe.first as i64, size - length, within);
         }
     }
-    let of = |(number, (probe, (_, peaks))): (usize, (&Probe, &(_, Peaks)))| {
-        peaks.lags(number, probe.first as f64 + 0.5 * length as f64)
+    let of = |(probe, (_, peaks)): (&&Probe, &(_, Peaks))| {
+        peaks.lags(probe.number, probe.first as f64 + 0.5 * length as f64)
     };
-    probes.iter().zip(&all).enumerate().flat_map(of).collect()
+    probes.iter().zip(&all).flat_map(of).collect()
 }
 
 impl Peaks {
@@ -277,8 +282,8 @@ impl LagLine {
         let farthest = FARTHEST_STEP as i64;
         let near = inside(expected - farthest)..inside(expected + farthest + length as i64);
         let begin = near.start;
-        let probe = Probe { first, samples: stretch(reference, first as i64, length) };
-        let mut found = lags(&[probe], &other.part(near), f64::INFINITY);
+        let probe = Probe { number: 0, first, samples: stretch(reference, first as i64, length) };
+        let mut found = lags(&[&probe], &other.part(near), f64::INFINITY);
         found.sort_by(|a, b| b.height.total_cmp(&a.height));
         let best = found.first().filter(|best| odds(&[**best]) >= LEAST_ODDS)?;
         let is_alike = |other: &&Lag| other.height >= ALIKE_WITHIN_PITCH * best.height;
@@ -307,14 +312,28 @@ impl LagLine {
 /// # Errors
 /// The lags, in samples, that explain the recordings alike; none if no lag stands out.
 pub(crate) fn line(reference: &Record, other: &Record, within: f64) -> Result<LagLine, Vec<i64>> {
-    let found = |longest: usize| -> Vec<Lag> {
-        if reference.samples.len() <= other.samples.len() {
-            return lags(&probes(reference, longest), other, within);
-        }
-        let lags = lags(&probes(other, longest), reference, within);
-        lags.into_iter().map(Lag::reversed).collect()
-    };
+    let is_shorter = reference.samples.len() <= other.samples.len();
+    let (shorter, longer) = if is_shorter { (reference, other) } else { (other, reference) };
     let best = |lags: &[Lag]| lines(lags).first().map_or(0.0, |(odds, _)| *odds);
+    let are_on_one = |lags: &[Lag], probes: usize| {
+        let is_likely =
+            |(odds, line): &(f64, LagLine)| *odds >= BEYOND_DOUBT && on(line, lags).len() == probes;
+        probes > 1 && lines(lags).first().is_some_and(is_likely) && likeliest(lags).is_ok()
+    };
+    let found = |longest: usize| -> Vec<Lag> {
+        let probes = probes(shorter, longest);
+        let (first, others): (Vec<&Probe>, Vec<&Probe>) =
+            probes.iter().partition(|probe| probe.number.is_multiple_of(FIRST_OF));
+        let of = |probes: &[&Probe]| -> Vec<Lag> {
+            let lags = lags(probes, longer, within);
+            if is_shorter { lags } else { lags.into_iter().map(Lag::reversed).collect() }
+        };
+        let mut found = of(&first);
+        if !are_on_one(&found, first.len()) {
+            found.extend(of(&others));
+        }
+        found
+    };
     let long = found(LONGEST_PROBES[0]);
     if let (Ok(line), true) = (likeliest(&long), best(&long) >= BEYOND_DOUBT) {
         return Ok(line);

@@ -145,8 +145,18 @@ pub fn calibrate_pooled(
             .and_then(|()| check_parts(records, signal))
             .map_err(|error| error.within(name, acquisitions.len()))?;
     }
+    calibrate_with(ChannelModel::new(spec)?, spec, acquisitions, signal, settings)
+}
+
+/// The same with the model of `spec`, of captures that fit the spec.
+pub(crate) fn calibrate_with(
+    mut model: ChannelModel,
+    spec: &Spec,
+    acquisitions: &[Acquisition<'_>],
+    signal: &CalibrationSignal,
+    settings: CalibrationSettings,
+) -> Result<Calibration, CalibrateError> {
     let reference = settings.reference;
-    let mut model = ChannelModel::new(spec)?;
     if let Some(part) = settings.fit.cutoff {
         model = model.scaling(part, spec)?;
     }

@@ -71,6 +71,12 @@ impl ChannelModel {
         })
     }
 
+    /// The same with the delays of another spec.
+    pub(crate) fn with_delays(&self, spec: &Spec) -> Self {
+        let delays = spec.delays_in_fast_periods().iter().map(|delay| delay.0).collect();
+        Self { delays, ..self.clone() }
+    }
+
     /// The same, where the cut-offs to be fitted are those of a part of the front ends of `spec`.
     ///
     /// # Errors

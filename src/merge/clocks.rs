@@ -2,7 +2,7 @@
 
 use super::error::{MergeError, MergeWarning};
 use super::{Recorder, SourceEstimate};
-use crate::align::{AlignSettings, AlignWarning, Alignment, ClockCourse, align};
+use crate::align::{AlignSettings, AlignWarning, align};
 use crate::calibrate::Record;
 use crate::instants::{
     Clock, ClockError, Converter, Estimator, FusionSettings, Recording, Signals, Spectrum, fuse,
@@ -13,8 +13,6 @@ use crate::spec::Spec;
 use crate::units::{CyclesPerFastPeriod, FastPeriods, Hertz, Seconds};
 use std::ops::RangeInclusive;
 
-/// Samples between two knots of a clock: its rate is constant over them.
-const KNOT_EVERY: usize = 256;
 /// Relative difference of rates that count as one.
 const SAME_RATE: f64 = 0.001;
 /// Samples on either side from which a recording is brought to another rate.
@@ -168,22 +166,23 @@ fn by_alignment(sources: &[Recorder], rate: Hertz, within: Option<Seconds>) -> R
     let ratio = rate.0 / own.0;
     let (mut recordings, mut found) = (Vec::new(), Vec::new());
     for (number, source) in sources.iter().enumerate() {
-        let ClockedSamples { clock, samples } = place(source, &alignment, number, own, ratio);
-        let channel = alignment.channels[number];
-        let begin = clock.at(0.0);
+        let (channel, course) = (alignment.channels[number], alignment.instants(number));
         let offset = if number == 0 { level } else { channel.offset.value + channel.gain.value * level };
-        recordings.push(recording(&samples, clock, number, offset));
+        let samples = usable(&source.record).0.into_iter().map(|x| x - offset).collect();
+        let spacing = if is_same(source.rate, own) { 1.0 } else { own.0 / source.rate.0 };
+        let recording = course.recording(samples, number, spacing, ratio);
         found.push(SourceEstimate {
-            start: Seconds(begin.0 / rate.0),
+            start: Seconds(recording.clock().at(0.0).0 / rate.0),
             drift: Some(channel.drift),
             gain: Some(channel.gain),
             noise: 0.0,
-            steps: alignment.instants(number).steps().to_vec(),
+            steps: course.steps().to_vec(),
         });
+        recordings.push(recording);
     }
     let gains: Vec<Estimate<f64>> = alignment.channels.iter().map(|channel| channel.gain).collect();
     let deviation =
-        |i: usize| FastPeriods(ratio * usual_deviation(alignment.instants(i), records[i].samples.len()));
+        |i: usize| FastPeriods(ratio * alignment.instants(i).usual_deviation(records[i].samples.len()));
     let delay_deviations = (0..sources.len()).map(deviation).collect();
     // Taps follow the delays, and the predicted error says what coincidences cost.
     let is_of_fixed = |warning: &AlignWarning| {
@@ -202,42 +201,6 @@ fn by_alignment(sources: &[Recorder], rate: Hertz, within: Option<Seconds>) -> R
         level,
         warnings: warnings.map(MergeWarning::from).collect(),
     })
-}
-
-/// The median over so many samples: at its ends a clock is known far worse than elsewhere.
-fn usual_deviation(course: &ClockCourse, count: usize) -> f64 {
-    let mut all: Vec<f64> = (0..count).step_by(KNOT_EVERY).map(|k| course.deviation(k as f64)).collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied().unwrap_or(0.0)
-}
-
-struct ClockedSamples {
-    clock: Clock,
-    samples: Vec<f64>,
-}
-
-/// The clock of a source in periods of the output, and its samples without those amid a step.
-fn place(source: &Recorder, alignment: &Alignment, number: usize, own: Hertz, ratio: f64) -> ClockedSamples {
-    let course = alignment.instants(number);
-    let (mut samples, _) = usable(&source.record);
-    let stretch = if is_same(source.rate, own) { 1.0 } else { own.0 / source.rate.0 };
-    let scaled = |k: usize| (k as f64 / stretch).round() as usize;
-    for step in course.steps() {
-        let end = scaled(step.samples.end).min(samples.len());
-        samples[scaled(step.samples.start).min(end)..end].fill(f64::NAN);
-    }
-    let beside = course
-        .steps()
-        .iter()
-        .flat_map(|step| [scaled(step.samples.start).saturating_sub(1), scaled(step.samples.end)]);
-    let mut knots: Vec<usize> =
-        (0..samples.len()).step_by(KNOT_EVERY).chain(beside).chain([samples.len()]).collect();
-    knots.sort_unstable();
-    knots.dedup();
-    let instant = |k: &usize| (*k as f64, FastPeriods(course.at(*k as f64 * stretch) * ratio));
-    let even = || Clock::even(FastPeriods(course.at(0.0) * ratio), FastPeriods(ratio * stretch));
-    // Only steps back in time could spoil a clock, and no recorder makes them.
-    ClockedSamples { clock: Clock::through(knots.iter().map(instant)).unwrap_or_else(|_| even()), samples }
 }
 
 fn is_same(one: Hertz, other: Hertz) -> bool {

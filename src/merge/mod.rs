@@ -16,14 +16,12 @@ pub use tracked::{DelayTrack, Tracked, TrackedFusion, fuse_stamped};
 
 use crate::align::ClockStep;
 use crate::calibrate::Record;
-use crate::instants::{Fused, FusionSettings, MeanSquare, Model, Prior, Recording, fuse};
+use crate::instants::{Fused, FusionSettings, MeanSquare, Model, PASSES, Prior, Recording, fuse};
 use crate::sine_fit::Estimate;
 use crate::units::{CyclesPerFastPeriod, Decibels, FastPeriods, Hertz, Seconds};
 use clocks::Clocked;
 use course::ErrorCourse;
 
-/// Passes in which the spectrum is learned; a third gains nothing.
-const PASSES: usize = 2;
 /// Samples of each recording on either side of an output.
 const REACH: usize = 24;
 /// Outputs below which nothing can be measured.
@@ -130,7 +128,10 @@ pub fn merge(sources: &[Recorder], settings: MergeSettings) -> Result<Merged, Me
     check_memory(grid.count)?;
     let step_noise = |source: &Recorder| source.step * source.step / 12.0;
     let prior = Prior {
-        band: settings.band.map(|band| CyclesPerFastPeriod((band.0 / rate.0).min(0.5))),
+        band: settings
+            .band
+            .map(|end| CyclesPerFastPeriod(0.0)..CyclesPerFastPeriod((end.0 / rate.0).min(0.5))),
+        front_ends: &[],
         passes: if settings.learn { PASSES } else { 0 },
         gains,
         gain_deviations,

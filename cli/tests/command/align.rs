@@ -218,6 +218,44 @@ fn the_delays_over_time_are_followed() {
     assert!(followed > fixed + 20.0, "{fixed} {followed}");
 }
 
+/// Two recorders with noise whose delays drift: `align` writes the noise, so that the SNR that is predicted
+/// is that of the output, and its last lines run as they are.
+#[test]
+fn noise_is_measured_and_the_commands_that_are_named_run() {
+    let spec = "fast_rate = 48000\nratio = 2\n[target]\nfilter = { family = \"butterworth\", order = 2, cutoff = 40000 }\n\
+        [signal]\nband = 18000\n[[channel]]\ndelay = 0\n[[channel]]\ndelay = 0\n[design]\nmethod = \"h2\"\ntaps = 24\n";
+    let desk = Desk::with_spec(spec);
+    let mut dice = Random(95);
+    let tones: Vec<[f64; 2]> = (0..150).map(|_| [18_000.0 * dice.part(), TAU * dice.part()]).collect();
+    let at = |k: usize| tones.iter().map(|[f, phase]| (TAU * f * k as f64 / RATE + phase).cos()).sum::<f64>();
+    let event: Vec<f32> = (0..192_000).map(|k| (0.01 * at(k)) as f32).collect();
+    wav::write(&desk, "event.wav", 1, 48_000, &event);
+    let simulated = ["simulate", "spec.toml", "--source", "event.wav", "-o", "c", "--samples", "192000"];
+    desk.good(&[&simulated[..], &["--noise", "1e-3", "--delay-error", "0,10us", "--drift", "0,3"]].concat());
+    let align = ["align", "spec.toml", "c/ch1.wav", "c/ch2.wav", "-o", "aligned.toml"];
+    let report = desk.report(&[&align[..], &["--trim", "cut"]].concat());
+    let spec = hybank::spec::Spec::from_toml(&crate::support::text(&desk.read("aligned.toml")), "a").unwrap();
+    let noise: f64 = spec.channels.iter().map(|channel| channel.noise.powi(2)).sum();
+    assert!((10.0 * (noise / 2e-6).log10()).abs() < 1.0, "{noise:e}");
+    let power = 1e-4 * 150.0 / 2.0;
+    assert!((spec.signal.unwrap().rms.powi(2) / power - 1.0).abs() < 0.1, "{power}");
+    let run = |report: &Value| {
+        let commands = report.pointer("/next").and_then(Value::as_array).unwrap();
+        let words =
+            |command: &Value| command.as_str().unwrap().split(' ').skip(1).map(String::from).collect();
+        let all: Vec<Vec<String>> = commands.iter().map(words).collect();
+        let run = |words: &Vec<String>| desk.report(&words.iter().map(String::as_str).collect::<Vec<_>>());
+        all.iter().map(run).last().unwrap()
+    };
+    let fused = run(&report);
+    let measured = desk.report(&["measure", "fused.wav", "--ref", "c/target.wav"]);
+    let [predicted, found] = [number(&fused, "/predicted_snr_db"), number(&measured, "/reference/snr_db")];
+    assert!((predicted - found).abs() < 1.0, "{predicted} predicted, {found} measured");
+    // Without --trim, too.
+    let merged = run(&desk.report(&[&align[..], &["--force"]].concat()));
+    assert!((number(&merged, "/predicted_snr_db") - predicted).abs() < 2.0, "{merged} {predicted}");
+}
+
 /// The frequency of a slow sweep moves as its delay would: without its error the drift was -64 ppm.
 #[test]
 fn a_slow_sweep_is_refused() {

@@ -14,10 +14,10 @@ use crate::units::{Decibels, Seconds};
 const DELAY_ROUNDING: f64 = 1e-12;
 
 impl Spec {
-    /// The text of a spec file with the delays, gains, offsets and filters of the channels, the latency, the
-    /// method and the uncertainty of this spec, whose measured filters are those of `models`. Everything
-    /// else of `text` is kept as it is, measurements by their files. Delays have the unit that the file
-    /// gives them.
+    /// The text of a spec file with the delays, gains, offsets, noise and filters of the channels, the
+    /// latency, the rms of the signal, the method and the uncertainty of this spec, whose measured filters
+    /// are those of `models`. Everything else of `text` is kept as it is, measurements by their files.
+    /// Delays have the unit that the file gives them.
     ///
     /// Where the text cannot be edited (it describes another spec, or writes channels in an unusual way),
     /// the whole spec is rewritten.
@@ -72,6 +72,11 @@ impl Spec {
             let table = document.entry("design").or_insert(Item::Table(Table::new()));
             set(table.as_table_like_mut()?, "method", self.design.method.name().into());
         }
+        if let (Some(own), Some(old)) = (&self.signal, &old.signal)
+            && own.rms != old.rms
+        {
+            set(document.get_mut("signal")?.as_table_like_mut()?, "rms", number(own.rms));
+        }
         let tables = tables_in(document.get_mut("channel")?);
         if tables.len() != self.channels.len() || old.channels.len() != self.channels.len() {
             return None;
@@ -96,7 +101,9 @@ impl ChannelSpec {
             true => set(table, "delay_samples", number(self.delay / h)),
             false => set(table, "delay", number(self.delay.0)),
         }
-        for (key, new, old) in [("gain", self.gain, old.gain), ("offset", self.offset, old.offset)] {
+        let [own, old_values] = [self, old].map(|channel| [channel.gain, channel.offset, channel.noise]);
+        for (key, (new, old)) in ["gain", "offset", "noise"].into_iter().zip(own.into_iter().zip(old_values))
+        {
             if new != old {
                 set(table, key, number(new));
             }

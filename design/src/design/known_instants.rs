@@ -7,7 +7,9 @@ use super::root_covariance::RootCovariance;
 use hybank_core::bank::Bank;
 use hybank_core::spec::{ROUNDING_16_BITS, Spec, USUAL_RMS};
 use hybank_core::units::{CyclesPerFastPeriod, FastPeriods, RadiansPerFastPeriod};
-use hybank_instants::{Converter, Estimator, Signals, Spectrum};
+use hybank_instants::{
+    Converter, Estimator, FusionSettings, Model, PASSES, Prior, Recording, Response, Signals, Spectrum,
+};
 use hybank_linalg::Complex;
 use std::f64::consts::TAU;
 
@@ -45,6 +47,44 @@ pub fn instants_estimator(bank: &Bank, longest: FastPeriods) -> Result<Estimator
         responses.iter().map(|response| response as _).collect();
     let spectrum = Spectrum::flat(low..high, longest);
     Ok(Estimator::new(Signals::new(&spectrum, &responses, problem.target, converters)))
+}
+
+/// Spectrum and power of the signal at the output of the target, and the noise of the converters of a spec,
+/// from recordings of its channels at known instants, without their offsets: all that the channels do not
+/// have in common is noise. Instants of a recording share an error of its deviation.
+///
+/// # Errors
+/// [`DesignError::NoBand`] for a signal without a band, [`DesignError::Linalg`] for samples that are given
+/// twice; as [`Problem::new`].
+pub fn learned_model(
+    spec: &Spec,
+    recordings: &[Recording],
+    delay_deviations: Vec<FastPeriods>,
+    settings: FusionSettings,
+) -> Result<Model, DesignError> {
+    let problem = Problem::before_sizing(spec)?;
+    let [low, high] = problem.band.ok_or(DesignError::NoBand)?.map(|end| CyclesPerFastPeriod(end.0 / TAU));
+    let response = |channel: &Channel| {
+        let [own, target] = [channel.front_end, problem.target].map(|i| &problem.front_ends[i]);
+        move |f: CyclesPerFastPeriod| {
+            let w = RadiansPerFastPeriod(TAU * f.0);
+            own.response(w) / target.response(w)
+        }
+    };
+    let is_target = problem.channels.iter().all(|channel| channel.front_end == problem.target);
+    let responses: Vec<_> = problem.channels.iter().filter(|_| !is_target).map(response).collect();
+    let responses: Vec<Response<'_>> = responses.iter().map(|response| response as _).collect();
+    let deviations = Deviations::of_spec(spec);
+    let prior = Prior {
+        band: Some(low..high),
+        front_ends: &responses,
+        passes: PASSES,
+        gains: problem.channels.iter().map(|channel| channel.gain).collect(),
+        gain_deviations: deviations.iter().map(|converter| converter.gain).collect(),
+        delay_deviations,
+        least_noise: spec.channels.iter().map(|channel| channel.rounding().powi(2)).collect(),
+    };
+    Ok(Model::learn(recordings, &prior, settings)?)
 }
 
 /// With the noise of 16 bits for converters without any: else tiny differences of their samples would count.

@@ -44,7 +44,7 @@ pub use designer::{Design, DesignOptions, ProofSearch, Study, design, judge_taps
 pub(crate) use deviations::Deviations;
 pub use error::DesignError;
 pub use figure_band::{BandSource, FigureBand};
-pub use known_instants::instants_estimator;
+pub use known_instants::{instants_estimator, learned_model};
 pub use length::TargetFigure;
 pub use limits::{Stage, Stop, TIME_LIMIT, remedy};
 pub(crate) use methods::mean_square_fir::least_squares_taps;
