@@ -5,7 +5,8 @@
 //! errors of matchers are white.
 //!
 //! 1. *Outliers.* A value is rejected if it contradicts its neighbours and the other views do not outvote
-//!    them (`outliers`). It takes the median of its neighbours, weighed by the likeness of their colours.
+//!    them (`outliers`). It takes the median of its neighbours, weighed by the likeness of their colours;
+//!    so do the values around it in maps of rigs.
 //! 2. *Noise.* With the standard deviation delta of the errors, which
 //!    [`Agreement`](crate::pipeline::Agreement) finds from the lookups of one map in another, and the bends
 //!    kappa of the surfaces, the map is the most probable one of a random walk of slopes (`surface`).
