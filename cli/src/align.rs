@@ -27,11 +27,12 @@ const NORMALISED_RATE: f64 = 48_000.0;
 /// Aligns recordings by recorders that were started by hand and have clocks of their own
 ///
 /// Finds by any signal (speech, music, noise) by how many samples each recording began before the others,
-/// how its clock drifts, its polarity, gain and offset, and writes the spec with these values. --trim writes
-/// the recordings from their first common sample on, and their delays over time.
+/// how its clock drifts, its polarity, gain and offset, and writes the spec with these values; with the band
+/// of the signal also its rms and the noise of the recorders. --trim writes the recordings from their first
+/// common sample on, and their delays over time.
 ///
 /// All is relative to a reference channel, whose clock is the time. The report says whether one recorder
-/// alone would do as well as all together.
+/// alone would do as well as all together, and which commands come next.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Examples:

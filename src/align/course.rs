@@ -189,27 +189,33 @@ impl<'a> Course<'a> {
         Estimate { value: middle.in_fast_periods(h), sigma: FastPeriods(half / h / HALF_WIDTH) }
     }
 
-    /// The delays at the pieces that were measured, in frames after the cut, all later by the fast periods
-    /// that were added, and the levels there.
-    pub(super) fn readings(&self, skips: &[usize], raised: usize, levels: &LevelCourses) -> Vec<Reading> {
+    /// The delays at the pieces that were measured, and at both ends of so many frames after the cut, all
+    /// later by the fast periods that were added, and the levels there.
+    pub(super) fn readings(
+        &self,
+        skips: &[usize],
+        frames: usize,
+        raised: usize,
+        levels: &LevelCourses,
+    ) -> Vec<Reading> {
         let added = self.spec.fast_period * raised as f64;
-        let of = |(piece, centre): (usize, &f64)| {
-            let frame = (centre.round() as u64).checked_sub(skips[self.reference] as u64)?;
-            let is_known = self.clocks.iter().any(|clock| clock.reading(piece).is_some());
-            let delay = |(i, clock): (usize, &ClockCourse)| {
-                if i == self.reference {
-                    return is_known.then(|| (self.spec.channels[i].delay + added, Seconds(0.0)));
-                }
-                clock.reading(piece)?;
+        let reading = |frame: u64| {
+            let delay = |i: usize| {
                 let Estimate { value, sigma } = self.at(i, (frame + skips[i] as u64) as f64);
                 Some((value - self.cut(i, skips) + added, sigma))
             };
-            let delays: Vec<_> = self.clocks.iter().enumerate().map(delay).collect();
             let [gains, offsets] = levels.at(frame as f64);
-            let is_measured = delays.iter().any(Option::is_some);
-            is_measured.then_some(Reading { frame, delays, gains, offsets })
+            Reading { frame, delays: (0..self.clocks.len()).map(delay).collect(), gains, offsets }
         };
-        self.centres.iter().enumerate().filter_map(of).collect()
+        let measured = |(piece, centre): (usize, &f64)| {
+            let is_measured = self.clocks.iter().any(|clock| clock.reading(piece).is_some());
+            let frame = (centre.round() as u64).checked_sub(skips[self.reference] as u64);
+            frame.filter(|_| is_measured)
+        };
+        let last = frames.saturating_sub(1) as u64;
+        let pieces = self.centres.iter().enumerate().filter_map(measured);
+        let inner = pieces.filter(|frame| (1..last).contains(frame));
+        std::iter::once(0).chain(inner).chain([last]).map(reading).collect()
     }
 
     /// When the samples were taken.

@@ -77,8 +77,8 @@ pub struct Alignment {
     pub pieces: usize,
     /// Pieces that gave delays.
     pub measured: usize,
-    /// The delays over these frames, where they were measured and do not contradict the others. Gains and
-    /// offsets that change. All are on smooth courses.
+    /// The delays over these frames, at both ends and where they were measured and do not contradict the
+    /// others. Gains and offsets that change. All are on smooth courses.
     pub readings: Vec<Reading>,
     /// By how much the gain and the offset of each channel change.
     pub changes: Vec<LevelChange>,
@@ -292,7 +292,7 @@ fn alignment(
     let first = skips[reference] as f64;
     let levels = estimates.iter().map(|one| (one.centre - first, one.channels.as_slice()));
     let levels = LevelCourses::new(&spec, levels);
-    let readings = course.readings(&skips, raised, &levels);
+    let readings = course.readings(&skips, frames, raised, &levels);
     let at: Vec<f64> = readings.iter().map(|reading| reading.frame as f64).collect();
     let changes = levels.changes(&at);
     let clocks = course.into_clocks();

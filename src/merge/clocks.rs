@@ -117,8 +117,9 @@ impl SpanMean {
     }
 }
 
-/// A mean over the time that two sources have in common that differs by more than chance.
-fn bias(first: &Recorder, source: &Recorder) -> Option<MergeWarning> {
+/// By how much the mean of a source differs from that of the first one, over the time that both have in
+/// common; `None` if chance explains it.
+fn bias(first: &Recorder, source: &Recorder) -> Option<f64> {
     let ends =
         |source: &Recorder| Some([source.stamps.as_ref()?.first()?.0, source.stamps.as_ref()?.last()?.0]);
     let [[begin, end], [own_begin, own_end]] = [ends(first)?, ends(source)?];
@@ -126,22 +127,25 @@ fn bias(first: &Recorder, source: &Recorder) -> Option<MergeWarning> {
     let (usual, own) = (SpanMean::new(first, &span)?, SpanMean::new(source, &span)?);
     let bias = own.mean - usual.mean;
     let by_chance = (usual.variance / usual.count + own.variance / own.count).sqrt();
-    let named = || MergeWarning::Bias { name: source.name.clone(), first: first.name.clone(), bias };
-    (bias.abs() > BIAS_SIGMAS * by_chance).then(named)
+    (bias.abs() > BIAS_SIGMAS * by_chance).then_some(bias)
 }
 
 fn by_stamps(sources: &[Recorder], rate: Hertz) -> Result<Clocked, MergeError> {
     let stamps = |source: &Recorder| source.stamps.clone().unwrap_or_default();
     let origin = stamps(&sources[0]).first().copied().unwrap_or(Seconds(0.0));
     let level = usable(&sources[0].record).1;
-    let (mut recordings, mut found) = (Vec::new(), Vec::new());
+    let (mut recordings, mut found, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
     for (number, source) in sources.iter().enumerate() {
+        let bias = if number > 0 { bias(&sources[0], source) } else { None };
+        let named =
+            |bias| MergeWarning::Bias { name: source.name.clone(), first: sources[0].name.clone(), bias };
+        warnings.extend(bias.map(named));
         let stamps = stamps(source);
         let instants: Vec<FastPeriods> =
             stamps.iter().map(|stamp| FastPeriods((stamp.0 - origin.0) * rate.0)).collect();
         let refused = |problem: ClockError| MergeError::Stamps { name: source.name.clone(), problem };
         let clock = Clock::stamps(&instants).map_err(refused)?;
-        recordings.push(recording(&usable(&source.record).0, clock, number, level));
+        recordings.push(recording(&usable(&source.record).0, clock, number, level + bias.unwrap_or(0.0)));
         found.push(plain(stamps.first().map_or(Seconds(0.0), |first| *first - origin)));
     }
     let count = sources.len();
@@ -152,7 +156,7 @@ fn by_stamps(sources: &[Recorder], rate: Hertz) -> Result<Clocked, MergeError> {
         gain_deviations: vec![0.0; count],
         delay_deviations: vec![FastPeriods(0.0); count],
         level,
-        warnings: sources[1..].iter().filter_map(|source| bias(&sources[0], source)).collect(),
+        warnings,
     })
 }
 

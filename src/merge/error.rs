@@ -148,10 +148,17 @@ pub enum MergeWarning {
         /// How many.
         clipped: usize,
     },
-    /// Means that differ, of sources with stamps: nothing else says which part of them is no signal.
+    /// Zeros in a row, as recorders write them for what they have not.
+    #[error("{zeros} zeros in rows of {} are left out: they are no samples", Quoted(.name))]
+    Zeros {
+        /// The source.
+        name: String,
+        /// How many.
+        zeros: usize,
+    },
+    /// Means that differ, of sources with stamps.
     #[error(
-        "the mean of {} differs by {bias:.4} from that of {} over the time that both cover, and counts as signal; subtract \
-         it from the samples if it is a bias of the sensor",
+        "the mean of {} differs by {bias:.4} from that of {} over the time that both cover; the difference is subtracted",
         Quoted(.name),
         Quoted(.first)
     )]

@@ -21,9 +21,12 @@ use crate::sine_fit::Estimate;
 use crate::units::{CyclesPerFastPeriod, Decibels, FastPeriods, Hertz, Seconds};
 use clocks::Clocked;
 use course::ErrorCourse;
+use std::ops::Range;
 
 /// Samples of each recording on either side of an output.
 const REACH: usize = 24;
+/// Zeros in a row that are no samples: no recorder with noise has so many, and one without loses nothing.
+const LEAST_ZEROS: usize = 256;
 /// Outputs below which nothing can be measured.
 const LEAST_OUTPUTS: usize = 1024;
 /// Most outputs for each sample of all recordings.
@@ -122,6 +125,8 @@ impl Quality {
 /// [`MergeError`].
 pub fn merge(sources: &[Recorder], settings: MergeSettings) -> Result<Merged, MergeError> {
     let rate = output_rate(sources, settings)?;
+    let ZerosLeftOut { sources, warnings: of_zeros } = without_zeros(sources);
+    let sources: &[Recorder] = &sources;
     let Clocked { recordings, found, gains, gain_deviations, delay_deviations, level, mut warnings } =
         clocks::placed(sources, rate, settings.within)?;
     let (first, grid) = grid(sources, &recordings, rate)?;
@@ -142,11 +147,43 @@ pub fn merge(sources: &[Recorder], settings: MergeSettings) -> Result<Merged, Me
     let fused = fuse(&model.estimator, &recordings, grid)?;
     let quality = quality(&model, &fused, &recordings, grid, rate)?;
     let noise = |(found, noise): (SourceEstimate, &f64)| SourceEstimate { noise: noise.sqrt(), ..found };
-    warnings.extend(sources.iter().filter_map(clipped));
+    warnings.extend(of_zeros.into_iter().chain(sources.iter().filter_map(clipped)));
     let sources = found.into_iter().zip(&model.noise).map(noise).collect();
     let samples = fused.samples.iter().map(|x| x + level).collect();
     let begin = Seconds(grid.first.0 / rate.0);
     Ok(Merged { samples, rate, first, begin, sources, quality, warnings })
+}
+
+/// Sources without zeros in long rows, and what was left out.
+struct ZerosLeftOut {
+    sources: Vec<Recorder>,
+    warnings: Vec<MergeWarning>,
+}
+
+/// Takes zeros in long rows for lost samples: they are no noise of a recorder, and as samples they would
+/// contradict those of the others. If all sources have such rows the sound itself is silent there.
+fn without_zeros(sources: &[Recorder]) -> ZerosLeftOut {
+    let rows: Vec<Vec<Range<usize>>> = sources.iter().map(|source| zeros(&source.record.samples)).collect();
+    let (mut sources, mut warnings) = (sources.to_vec(), Vec::new());
+    if rows.iter().all(|rows| !rows.is_empty()) {
+        return ZerosLeftOut { sources, warnings };
+    }
+    for (source, rows) in sources.iter_mut().zip(rows).filter(|(_, rows)| !rows.is_empty()) {
+        let zeros = rows.iter().map(Range::len).sum();
+        warnings.push(MergeWarning::Zeros { name: source.name.clone(), zeros });
+        rows.into_iter().for_each(|row| source.record.keep[row].fill(false));
+    }
+    ZerosLeftOut { sources, warnings }
+}
+
+/// The long rows of zeros.
+fn zeros(samples: &[f64]) -> Vec<Range<usize>> {
+    let mut end = 0;
+    let row = |row: &[f64]| {
+        end += row.len();
+        (row[0] == 0.0 && row.len() >= LEAST_ZEROS).then(|| end - row.len()..end)
+    };
+    samples.chunk_by(|a, b| (*a == 0.0) == (*b == 0.0)).filter_map(row).collect()
 }
 
 fn clipped(source: &Recorder) -> Option<MergeWarning> {

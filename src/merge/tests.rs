@@ -1,6 +1,6 @@
 //! Recordings of sums of cosines, which are exact at any instant.
 
-use super::{MergeError, MergeSettings, MergeWarning, Merged, Recorder, merge};
+use super::{MergeError, MergeSettings, MergeWarning, Merged, Recorder, merge, without_zeros, zeros};
 use crate::calibrate::Record;
 use crate::random::Random;
 use crate::units::{Hertz, Seconds};
@@ -75,9 +75,10 @@ fn a_constant_is_in_the_result_once() {
     assert!((mean - 0.3).abs() < 1e-3, "{mean}");
 }
 
-/// Two loggers of one signal, one of them with a bias.
+/// Two loggers of one signal, one of them with a bias: it is named, and what is left of it is as small as
+/// without.
 #[test]
-fn a_bias_is_named_and_its_absence_is_not() {
+fn a_bias_is_subtracted() {
     let logger = |name, begin: f64, bias: f64, seed| {
         let stamps: Vec<f64> = (0..8000).map(|k| begin + f64::from(k) / 4000.0).collect();
         let mut logger = source(name, 1.0, stamps.iter().copied(), seed);
@@ -85,10 +86,39 @@ fn a_bias_is_named_and_its_absence_is_not() {
         Recorder { stamps: Some(stamps.into_iter().map(Seconds).collect()), ..logger }
     };
     let merged = |bias| merge(&[logger("a", 0.0, 0.0, 1), logger("b", 0.5001, bias, 2)], SETTINGS).unwrap();
-    assert_eq!(merged(0.0).warnings, []);
-    let warnings = merged(0.05).warnings;
-    let [MergeWarning::Bias { name, first, bias }] = &warnings[..] else { panic!("{warnings:?}") };
-    assert!(name == "b" && first == "a" && (bias - 0.05).abs() < 0.01, "{warnings:?}");
+    let (without, with) = (merged(0.0), merged(0.05));
+    assert_eq!(without.warnings, []);
+    let [MergeWarning::Bias { name, first, bias }] = &with.warnings[..] else {
+        panic!("{:?}", with.warnings)
+    };
+    assert!(name == "b" && first == "a" && (bias - 0.05).abs() < 0.01, "{bias}");
+    let apart = |(one, other): (&f64, &f64)| (one - other).powi(2);
+    let square =
+        without.samples.iter().zip(&with.samples).map(apart).sum::<f64>() / with.samples.len() as f64;
+    assert!(square.sqrt() < 2e-3, "{}", square.sqrt());
+}
+
+/// One recording has a second of zeros: elsewhere the result is what it is without them.
+#[test]
+fn zeros_in_a_row_are_lost_samples() {
+    let first = source("a", 1.0, (0..24_000).map(|k| 0.3 + f64::from(k) / 4000.0), 1);
+    let second = source("b", -0.6, (0..24_000).map(|k| 0.1 + f64::from(k) / 4000.0 / (1.0 + 35e-6)), 2);
+    let mut broken = second.clone();
+    broken.record.samples[11_000..15_000].fill(0.0);
+    let whole = merge(&[first.clone(), second], SETTINGS).unwrap();
+    let merged = merge(&[first, broken], SETTINGS).unwrap();
+    assert!(merged.warnings.contains(&MergeWarning::Zeros { name: "b".into(), zeros: 4000 }));
+    // Away from the zeros, which begin 2.55 seconds after the first output.
+    let error = |merged: &Merged| {
+        let error = |n: usize| (merged.samples[n] - sound(0.3 + merged.begin.0 + n as f64 / 8000.0)).powi(2);
+        (400..20_000).map(error).sum::<f64>()
+    };
+    assert!(error(&merged) < 1.3 * error(&whole), "{} {}", error(&merged), error(&whole));
+    assert_eq!(zeros(&[[1.0; 300], [0.0; 300], [2.0; 300]].concat()), [300..600]);
+    let silent = |name| source(name, 0.0, (0..600).map(f64::from), 1);
+    let mut both = [silent("a"), silent("b")];
+    both.iter_mut().for_each(|one| one.record.samples[100..500].fill(0.0));
+    assert!(without_zeros(&both).warnings.is_empty());
 }
 
 /// Stamps off by up to 30 % of their period are fused as they are.
