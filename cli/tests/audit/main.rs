@@ -6,6 +6,8 @@
 //! `HYBANK_CAMPAIGN=20` makes 20 times as many cases, `HYBANK_TRIALS=124..125` that one. `-- --nocapture`
 //! shows the tables.
 
+#![allow(clippy::result_large_err, reason = "a task that ends early gives what it has found")]
+
 #[path = "../support/mod.rs"]
 mod support;
 
