@@ -114,7 +114,7 @@ fn zeros_in_a_row_are_lost_samples() {
         (400..20_000).map(error).sum::<f64>()
     };
     assert!(error(&merged) < 1.3 * error(&whole), "{} {}", error(&merged), error(&whole));
-    assert_eq!(zeros(&[[1.0; 300], [0.0; 300], [2.0; 300]].concat()), [300..600]);
+    assert_eq!(zeros(&[[1.0; 300], [0.0; 300], [2.0; 300]].concat()).first(), Some(&(300..600)));
     let silent = |name| source(name, 0.0, (0..600).map(f64::from), 1);
     let mut both = [silent("a"), silent("b")];
     both.iter_mut().for_each(|one| one.record.samples[100..500].fill(0.0));
