@@ -7,7 +7,7 @@
 import importlib
 
 from hybank import _functions
-from hybank._functions import align, analyze, calibrate, import_taps, load, measure, simulate, verify
+from hybank._functions import align, analyze, calibrate, import_taps, load, measure, merge, simulate, verify
 from hybank._hybank import Bank, HybankError, Recording, SpecError, Stream, __version__
 from hybank._inputs import Captures, read
 from hybank._keywords import check_methods
@@ -21,6 +21,7 @@ from hybank._results import (
     FuseReport,
     Gamma,
     Measurement,
+    Merged,
     Record,
     Verified,
 )
@@ -54,6 +55,7 @@ __all__ = [
     "Gamma",
     "HybankError",
     "Measurement",
+    "Merged",
     "Record",
     "Recording",
     "Signal",
@@ -74,6 +76,7 @@ __all__ = [
     "import_taps",
     "load",
     "measure",
+    "merge",
     "rc",
     "read",
     "simulate",

@@ -16,6 +16,7 @@ from hybank._results import (
     FuseReport as FuseReport,
     Gamma as Gamma,
     Measurement as Measurement,
+    Merged as Merged,
     Record as Record,
     Verified as Verified,
 )
@@ -34,6 +35,7 @@ __all__ = [
     "Gamma",
     "HybankError",
     "Measurement",
+    "Merged",
     "Record",
     "Recording",
     "Signal",
@@ -54,6 +56,7 @@ __all__ = [
     "import_taps",
     "load",
     "measure",
+    "merge",
     "rc",
     "read",
     "simulate",
@@ -366,6 +369,16 @@ def align(
     within: float | None = None,
     axis: int = -1,
 ) -> Alignment: ...
+def merge(
+    x: Sequence[ArrayLike] | _Files,
+    rate: float | Sequence[float] | None = None,
+    *,
+    times: Sequence[ArrayLike] | None = None,
+    output_rate: float | None = None,
+    band: float | None = None,
+    flat: bool = False,
+    within: float | None = None,
+) -> Merged: ...
 def calibrate(
     x: ArrayLike | _Files | Captures,
     spec: Bank | _Spec,

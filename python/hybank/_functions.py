@@ -197,6 +197,45 @@ def align(x, spec, *, reference=None, within=None, axis=-1):
 
 
 @checked
+def merge(x, rate=None, *, times=None, output_rate=None, band=None, flat=False, within=None):
+    """One recording of several of one event, by recorders with clocks of their own, at a higher rate.
+
+    Parameters
+    ----------
+    x : list of array_like, or list of files
+        One recording each, of any length. The clock of the first is that of the result.
+    rate : float or list of float, optional
+        Samples per second, of all or of each. Files, and samples with times, have theirs.
+    times : list of array_like, optional
+        When the samples of each recording were taken, in seconds on one clock.
+    output_rate : float, optional
+        Samples per second of the result.
+    band : float, optional
+        The highest frequency of the signal, in hertz; measured if left out.
+    flat : bool
+        Take the spectrum as flat over the band.
+    within : float, optional
+        How far apart the recordings began at most, in seconds.
+
+    Returns
+    -------
+    Merged
+
+    Examples
+    --------
+    >>> times = [np.arange(2000) / 100, np.arange(2000) / 100 + 3.3e-3]
+    >>> f = np.arange(0.5, 60, 0.73)
+    >>> sensors = [np.cos(2 * np.pi * np.outer(t, f) + f**2).sum(1) for t in times]
+    >>> merged = hb.merge(sensors, times=times, output_rate=200)
+    >>> merged.rate, merged.one_suffices
+    (200.0, None)
+    """
+    x, rates = _inputs.with_rates(x, rate, times)
+    times = None if times is None else [np.asarray(one, float).tolist() for one in times]
+    return _hybank.merge(x, rates, times, output_rate, band, flat, within)
+
+
+@checked
 def calibrate(
     x, spec, *, tones=None, waveform=None, rate=None, blind=False, fit=("delay", "gain", "offset"), reference=None,
     clip=None, interleaved=None, axis=-1, full_scale=None, nonlinearity=None

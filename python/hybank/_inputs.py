@@ -199,6 +199,28 @@ def recordings(x, axis, source):
     return list(np.asarray(x).T if axis in (0, -2) else x)
 
 
+def with_rates(x, rate, times):
+    """A list with an array for each recording, and their rates."""
+    if _are_files(x):
+        read_all = [_read(file, None, {}) for file in ([x] if isinstance(x, (str, os.PathLike)) else x)]
+        pairs = [(channel, one.rate if rate is None else rate) for one in read_all for channel in one.channels]
+        return [channel for channel, _ in pairs], [float(own) for _, own in pairs]
+    x = [np.asarray(one) for one in x]
+    if times is not None:
+        if len(times) != len(x):
+            raise HybankError(f"times: {len(times)} lists for {len(x)} recordings; give one for each")
+        spans = [np.asarray(one, float) for one in times]
+        if any(one.ndim != 1 or len(one) < 2 or not one[-1] > one[0] for one in spans):
+            raise HybankError("times: give two or more times of each recording, in ascending order")
+        return x, [(len(one) - 1) / (one[-1] - one[0]) for one in spans]
+    if rate is None:
+        raise HybankError("rate: arrays state none; give the samples per second, or times")
+    rates = np.broadcast_to(np.asarray(rate, float), len(x)) if np.ndim(rate) == 0 else np.asarray(rate, float)
+    if len(rates) != len(x) or not np.all((rates > 0) & np.isfinite(rates)):
+        raise HybankError(f"rate: give one positive number, or one for each of {len(x)} recordings")
+    return x, rates.tolist()
+
+
 def channels(bank, x, axis, full_scale):
     """A list of samples for each channel, in double precision, and the rate of the bank's output."""
     if _are_files(x):

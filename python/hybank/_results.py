@@ -401,6 +401,57 @@ class Alignment:
 
 @final
 @dataclass(frozen=True, slots=True, eq=False)
+class Merged:
+    """One recording of several. Arrays have one value per recording.
+
+    Attributes
+    ----------
+    samples, rate
+        The result, and its samples per second.
+    first, begin
+        The sample of the first recording, from 0, at whose instant the result begins, and that instant in seconds
+        after its first sample.
+    start
+        Seconds by which each recording began after the first one.
+    drift_ppm, gain
+        By how many ppm each clock is fast, and each gain; None for samples with times.
+    noise
+        Rms of the noise of each recording.
+    steps
+        Where each recording lost samples, as in `Alignment`.
+    snr_db, worst_second_db, worst_second_at
+        The predicted SNR, that of the worst second, and when this begins.
+    alone_db, mean_db
+        What each recording has alone, and the mean of these.
+    one_suffices
+        The recording, from 1, that alone does as well.
+    warnings
+        What a reader must know. Each is a ``UserWarning``, too.
+    """
+
+    samples: NDArray[np.float64]
+    rate: float
+    first: int
+    begin: float
+    start: NDArray[np.float64]
+    drift_ppm: NDArray[np.float64] | None
+    gain: NDArray[np.float64] | None
+    noise: NDArray[np.float64]
+    steps: list[list[Record]]
+    snr_db: float
+    worst_second_db: float
+    worst_second_at: float
+    alone_db: list[float]
+    mean_db: float
+    one_suffices: int | None
+    warnings: list[str]
+
+    def __repr__(self):
+        return f"<hybank.Merged of {len(self.start)} recordings: {len(self.samples)} samples, {self.snr_db:.1f} dB>"
+
+
+@final
+@dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
     """What a calibration found. Arrays have one value per channel; it is NaN where the spec's value stands.
 

@@ -21,6 +21,7 @@ mod fuse;
 mod hardware;
 mod ibr;
 mod measure;
+mod merge;
 mod outputs;
 mod pictures;
 mod proofs;
@@ -53,6 +54,7 @@ fn _hybank(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(proofs::analyze, module)?)?;
     module.add_function(wrap_pyfunction!(simulate::simulate, module)?)?;
     module.add_function(wrap_pyfunction!(align::align, module)?)?;
+    module.add_function(wrap_pyfunction!(merge::merge, module)?)?;
     module.add_function(wrap_pyfunction!(calibrate::calibrate, module)?)?;
     module.add_function(wrap_pyfunction!(measure::measure, module)?)?;
     module.add_function(wrap_pyfunction!(measure::compare, module)?)?;

@@ -242,6 +242,33 @@ def test_recordings_are_aligned_by_any_signal():
     assert hb.align(integers, spec).skip == [0, 500]
 
 
+def test_recordings_are_merged():
+    f = np.linspace(63.0, 3200.0, 140) + 3 * np.sin(np.arange(140.0))
+
+    def sound(t):
+        return 0.02 * sum(np.cos(2 * np.pi * f * t + k * k) for k, f in enumerate(f))
+
+    t = [0.3 + np.arange(16_000) / 4000, 0.1 + np.arange(16_000) / 4000 / (1 + 35e-6)]
+    heard = [sound(t[0]), -0.6 * sound(t[1])]
+    merged = hb.merge(heard, 4000)
+    assert merged.rate == 8000 and merged.one_suffices is None and not merged.warnings and "Merged" in repr(merged)
+    assert abs(merged.start[1] + 0.2) < 1e-6 and abs(merged.drift_ppm[1] - 35) < 0.5 and abs(merged.gain[1] + 0.6) < 1e-3
+    inner = slice(400, -400)
+    truth = sound(0.3 + merged.begin + np.arange(len(merged.samples)) / merged.rate)[inner]
+    assert 10 * np.log10(np.mean(truth**2) / np.mean((merged.samples[inner] - truth) ** 2)) > 25
+    stamped = hb.merge(heard, times=[t[0], t[1]], output_rate=8000)
+    assert stamped.drift_ppm is None and len(stamped.alone_db) == 2
+    for keywords, words in [
+        ({}, "rate: arrays state none"),
+        ({"rate": [4000]}, "one for each of 2"),
+        ({"times": [t[0]]}, "1 lists for 2"),
+        ({"times": [t[0], t[1][:-1]]}, r"times\[1\]"),
+        ({"rate": 4000, "output_rate": 1e9}, "rate"),
+    ]:
+        with pytest.raises(hb.HybankError, match=words):
+            hb.merge(heard, **keywords)
+
+
 def test_recordings_that_do_not_fit_are_refused():
     spec = plant([60e-9, 30e-9])
     random = np.random.default_rng(9)
