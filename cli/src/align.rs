@@ -177,19 +177,27 @@ impl Args {
         let of = |paths: &[PathBuf]| paths.iter().map(|path| word(path)).collect::<Vec<_>>().join(" ");
         let is_file = self.captures.iter().chain([&self.output]).all(|path| !is_dash(path));
         let (moves, spec) = (found.moves(), &found.spec);
+        // Such delays pass where the channels sample at one instant, and a bank takes zeros for samples.
+        let is_beyond = found.largest_move().is_some_and(|moved| moved.0 > spec.ratio as f64);
         let has_band = spec.signal.as_ref().is_some_and(|signal| signal.band().is_some());
+        let is_for_bank = !found.has_lost_zeros() && !is_beyond && (!moves || has_band);
+        // Options that say what the recordings are would have to be said again.
+        let states_itself = self.reading.is_default();
         let is_whole = found.channels.iter().all(|channel| channel.skip == 0);
         let (inputs, table) = match self.written(found.channels.len()).split_last() {
-            Some((drift, trimmed)) if !moves || has_band => {
+            Some((drift, trimmed)) if is_for_bank => {
                 (of(trimmed), if moves { format!(" --track {}", word(drift)) } else { String::new() })
             }
-            None if is_whole && !moves => (of(&self.captures), String::new()),
+            None if is_whole && !moves && is_for_bank && states_itself => (of(&self.captures), String::new()),
             _ => {
                 let command = || {
                     let rate = rate * spec.ratio as f64;
-                    format!("hybank merge {} -o merged.wav --rate {rate}Hz", of(&self.captures))
+                    let seconds = |time: WrittenTime| time.in_seconds(spec.fast_period).0;
+                    let within =
+                        self.within.map(|time| format!(" --within {}s", seconds(time))).unwrap_or_default();
+                    format!("hybank merge {} -o merged.wav --rate {rate}Hz{within}", of(&self.captures))
                 };
-                let is_one_each = self.captures.len() == found.channels.len();
+                let is_one_each = self.captures.len() == found.channels.len() && states_itself;
                 return (is_file && is_one_each).then(command).into_iter().collect();
             }
         };

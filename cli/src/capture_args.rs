@@ -6,6 +6,7 @@ use super::print::{Failure, failed, failed_at, is_dash};
 use super::table_args::TableArgs;
 use hybank::bank::Bank;
 use hybank::captures::{Converters, FileFormat};
+use hybank::io::table::TableOptions;
 use hybank::io::{Coding, MultiReader, ReadOptions, StatedScale, TimeInterleaving};
 use hybank::messages::Quoted;
 use hybank::pipeline::matching::{self, NotInTurn};
@@ -64,6 +65,13 @@ impl CaptureArgs {
             (_, ending) if WAV.iter().any(|known| ending == *known) => ReadOptions::files(),
             _ => ReadOptions { scale: StatedScale::default(), ..own },
         }
+    }
+
+    /// Whether nothing is said of the captures.
+    pub(super) fn is_default(&self) -> bool {
+        let Self { format, channels, iq, scale, channel, table } = self;
+        let is_said = channels.is_some() || *iq || scale.full_scale.is_some() || channel.is_some();
+        *format == Coding::Wav && !is_said && table.options() == TableOptions::default()
     }
 
     /// What is said of captures that do not state their format.

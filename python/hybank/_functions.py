@@ -4,6 +4,8 @@ import functools
 import inspect
 import os
 
+import numpy as np
+
 from hybank import _hybank, _inputs
 from hybank._keywords import checked, need_numbers
 from hybank._results import Comparison

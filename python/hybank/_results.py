@@ -375,6 +375,8 @@ class Alignment:
         The best ``channel`` alone, its ``snr_db``, and ``together_db`` of all, whatever the filters are.
     one_suffices
         Whether that channel suffices.
+    moves
+        Whether delays move so much that fixed taps lose by it.
     warnings
         What a reader of the values must know. Each is a ``UserWarning``, too.
     """
@@ -393,6 +395,7 @@ class Alignment:
     track: str
     alone: Record
     one_suffices: bool
+    moves: bool
     warnings: list[str]
 
     def __repr__(self):

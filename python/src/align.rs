@@ -65,6 +65,7 @@ fn result<'py>(py: Python<'py>, found: &Alignment, alone: Alone) -> PyResult<Bou
         .with("track", lines.collect::<String>())?
         .with("alone", record(py, &alone)?)?
         .with("one_suffices", alone.suffices())?
+        .with("moves", found.moves())?
         .with("warnings", found.warnings.iter().map(ToString::to_string).collect::<Vec<_>>())?
         .object()
 }

@@ -26,7 +26,8 @@ LEFT_OUT = {
     "analyze": {"understood"},
     # Arrays with a value per channel in their place.
     "calibrate": {"channels"},
-    "align": {"channels"},
+    # And commands to go on with.
+    "align": {"channels", "next"},
 }
 # Tuples, as those of streams.
 NOT_INSIDE = {"gaps"}

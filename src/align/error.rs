@@ -123,6 +123,17 @@ pub enum AlignWarning {
         /// Where, and how many.
         step: ClockStep,
     },
+    /// Zeros that others lack.
+    #[error(
+        "the recording of channel {channel} has {zeros} zeros in rows, which are no samples: nothing was measured by \
+         them; leave them out of the result, as a merge of the recordings does"
+    )]
+    Zeros {
+        /// From 1.
+        channel: usize,
+        /// Their number.
+        zeros: usize,
+    },
     /// Two channels come to sample at one instant.
     #[error(
         "{at:.3} after the first frame the channels {} and {} sample at one instant: no bank recovers the signal there. \

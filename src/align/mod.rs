@@ -17,6 +17,7 @@ mod pieces;
 mod steps;
 #[cfg(test)]
 mod tests;
+mod zeros;
 
 pub use clock::{ClockCourse, ClockStep};
 pub use error::{AlignError, AlignWarning};
@@ -28,11 +29,13 @@ use crate::calibrate::{
 use crate::figures::Alone;
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
-use crate::units::Seconds;
+use crate::units::{FastPeriods, Seconds};
 use course::{Course, mean};
 use path::Disagree;
 use pieces::{PieceEstimate, Pieces};
+use std::ops::Range;
 use steps::{Lags, Mended, mended, spliced};
+pub(crate) use zeros::lost_zeros;
 
 /// Least samples that all recordings have in common.
 const LEAST_SAMPLES: usize = 1024;
@@ -109,6 +112,20 @@ impl Alignment {
         &self.clocks[channel]
     }
 
+    /// Whether a recording has zeros that are no samples.
+    pub fn has_lost_zeros(&self) -> bool {
+        self.warnings.iter().any(|warning| matches!(warning, AlignWarning::Zeros { .. }))
+    }
+
+    /// By how much the delays move at most, where it is so much that fixed taps lose by it.
+    pub fn largest_move(&self) -> Option<FastPeriods> {
+        let moved = |warning: &AlignWarning| match warning {
+            AlignWarning::FixedTaps { moved, .. } => Some(*moved),
+            _ => None,
+        };
+        self.warnings.iter().filter_map(moved).max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
     /// Whether a delay moves by so much that fixed taps lose by it.
     pub fn moves(&self) -> bool {
         self.warnings.iter().any(|warning| matches!(warning, AlignWarning::FixedTaps { .. }))
@@ -156,6 +173,9 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
         return Err(AlignError::Silent { channel: i + 1 });
     }
     enough(records.iter().map(|record| record.samples.len()).min().unwrap_or(0))?;
+    let lost = lost_zeros(&records.iter().collect::<Vec<_>>(), &vec![1.0; records.len()]);
+    let records: &[Record] =
+        &records.iter().zip(&lost).map(|(record, rows)| record.without(rows)).collect::<Vec<_>>();
     let within = within.map_or(f64::INFINITY, |time| time / (spec.fast_period * spec.ratio as f64));
     let placed = |i: usize| match i == reference {
         true => Ok(Mended { record: records[i].clone(), steps: Vec::new(), lags: Lags::none() }),
@@ -176,11 +196,15 @@ pub fn align(spec: &Spec, records: &[Record], settings: AlignSettings) -> Result
     let (mut estimates, mut course) = measured(&lags)?;
     for _ in 1..MOST_PASSES {
         let Some(better) = course.lags(&lags, &stretches) else { break };
-        lags = better;
-        (estimates, course) = measured(&lags)?;
+        // Where channels sample at one instant the fit need not settle from there: what is known stays.
+        let Ok(again) = measured(&better) else { break };
+        (lags, (estimates, course)) = (better, again);
     }
     let mut found = alignment(spec, &whole, course, &estimates, pieces);
     found.measure_noise(records)?;
+    let zeros = lost.iter().map(|rows| rows.iter().map(Range::len).sum());
+    let zeros = (1..).zip(zeros).filter(|(_, zeros)| *zeros > 0);
+    found.warnings.extend(zeros.map(|(channel, zeros)| AlignWarning::Zeros { channel, zeros }));
     Ok(found)
 }
 

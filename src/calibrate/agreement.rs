@@ -89,7 +89,9 @@ fn explained(snr: f64) -> String {
             "the captures fit the spec only to an SNR of {snr:.0} dB: look at their starts, delays and gains, and at their noise"
         )
     } else {
-        format!("the captures agree with the spec; they show an SNR of about {snr:.0} dB")
+        format!(
+            "the captures agree with the spec: errors that leave an SNR below about {snr:.0} dB would show"
+        )
     }
 }
 

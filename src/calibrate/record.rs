@@ -106,6 +106,13 @@ impl Record {
         self.keep.iter().filter(|&&keep| keep).count()
     }
 
+    /// The same without these samples.
+    pub(crate) fn without(&self, rows: &[std::ops::Range<usize>]) -> Self {
+        let mut keep = self.keep.clone();
+        rows.iter().for_each(|row| keep[row.clone()].fill(false));
+        Self { keep, ..self.clone() }
+    }
+
     /// Whether nearly all samples are those of `other`: two converters have noise of their own and sample at
     /// other instants.
     pub(super) fn repeats(&self, other: &Self) -> bool {

@@ -14,7 +14,7 @@ pub use course::PredictedQuality;
 pub use error::{MergeError, MergeWarning};
 pub use tracked::{DelayTrack, Tracked, TrackedFusion, fuse_stamped};
 
-use crate::align::ClockStep;
+use crate::align::{ClockStep, lost_zeros};
 use crate::calibrate::Record;
 use crate::instants::{Fused, FusionSettings, MeanSquare, Model, PASSES, Prior, Recording, fuse};
 use crate::sine_fit::Estimate;
@@ -25,8 +25,6 @@ use std::ops::Range;
 
 /// Samples of each recording on either side of an output.
 const REACH: usize = 24;
-/// Zeros in a row that are no samples: no recorder with noise has so many, and one without loses nothing.
-const LEAST_ZEROS: usize = 256;
 /// Outputs below which nothing can be measured.
 const LEAST_OUTPUTS: usize = 1024;
 /// Most outputs for each sample of all recordings.
@@ -160,30 +158,18 @@ struct ZerosLeftOut {
     warnings: Vec<MergeWarning>,
 }
 
-/// Takes zeros in long rows for lost samples: they are no noise of a recorder, and as samples they would
-/// contradict those of the others. If all sources have such rows the sound itself is silent there.
+/// Takes zeros in long rows for lost samples.
 fn without_zeros(sources: &[Recorder]) -> ZerosLeftOut {
-    let rows: Vec<Vec<Range<usize>>> = sources.iter().map(|source| zeros(&source.record.samples)).collect();
-    let (mut sources, mut warnings) = (sources.to_vec(), Vec::new());
-    if rows.iter().all(|rows| !rows.is_empty()) {
-        return ZerosLeftOut { sources, warnings };
-    }
-    for (source, rows) in sources.iter_mut().zip(rows).filter(|(_, rows)| !rows.is_empty()) {
+    let records: Vec<&Record> = sources.iter().map(|source| &source.record).collect();
+    let rates: Vec<f64> = sources.iter().map(|source| source.rate.0).collect();
+    let (mut left, mut warnings) = (Vec::new(), Vec::new());
+    for (source, rows) in sources.iter().zip(lost_zeros(&records, &rates)) {
         let zeros = rows.iter().map(Range::len).sum();
-        warnings.push(MergeWarning::Zeros { name: source.name.clone(), zeros });
-        rows.into_iter().for_each(|row| source.record.keep[row].fill(false));
+        let warning = || MergeWarning::Zeros { name: source.name.clone(), zeros };
+        warnings.extend((zeros > 0).then(warning));
+        left.push(Recorder { record: source.record.without(&rows), ..source.clone() });
     }
-    ZerosLeftOut { sources, warnings }
-}
-
-/// The long rows of zeros.
-fn zeros(samples: &[f64]) -> Vec<Range<usize>> {
-    let mut end = 0;
-    let row = |row: &[f64]| {
-        end += row.len();
-        (row[0] == 0.0 && row.len() >= LEAST_ZEROS).then(|| end - row.len()..end)
-    };
-    samples.chunk_by(|a, b| (*a == 0.0) == (*b == 0.0)).filter_map(row).collect()
+    ZerosLeftOut { sources: left, warnings }
 }
 
 fn clipped(source: &Recorder) -> Option<MergeWarning> {

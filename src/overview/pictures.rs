@@ -1,6 +1,6 @@
 //! The pictures of a bank.
 
-use crate::bank::Bank;
+use crate::bank::{Bank, SynthesisFilters};
 use crate::design::responses::{analysis_gains, fir_response, front_end_gains, impulse_responses};
 use crate::design::{self, DesignError, norm_at};
 use crate::figures::{ToneOutput, tone_curve};
@@ -253,7 +253,10 @@ fn pass_band(bank: &Bank, responses: &[Vec<f64>]) -> f64 {
 }
 
 fn impulses(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
-    let seen = seen(responses);
+    let seen = match bank.filters {
+        SynthesisFilters::Fir(_) => usize::MAX,
+        SynthesisFilters::StateSpace(_) => seen(responses),
+    };
     let curve = |(label, taps): (String, &Vec<f64>)| Series {
         label,
         points: taps.iter().take(seen).enumerate().map(|(n, tap)| (n as f64, *tap)).collect(),
@@ -263,7 +266,7 @@ fn impulses(bank: &Bank, responses: &[Vec<f64>]) -> Chart {
     Chart { curves: Curves::Stems, ..chart }
 }
 
-/// The fast samples after which no response can be seen: a recursive filter goes on without end.
+/// The fast samples after which nothing can be seen of recursive filters, which go on without end.
 fn seen(responses: &[Vec<f64>]) -> usize {
     let largest = responses.iter().flatten().fold(0.0, |most: f64, tap| most.max(tap.abs()));
     let last = |taps: &Vec<f64>| taps.iter().rposition(|tap| tap.abs() >= SEEN * largest);
