@@ -12,8 +12,9 @@ use crate::sampling::median;
 const COUNT: usize = 4;
 /// Fewest readings whose bend is looked at.
 const LEAST_READINGS: usize = 16;
-/// The polynomial leaves this share of the squares that a line leaves, or it is no bend.
-const CLEARLY_LESS: f64 = 0.25;
+/// The polynomial leaves this share of the squares that a line leaves, or it is no bend. Of a clock that
+/// jumps to another rate it leaves 6 %.
+const CLEARLY_LESS: f64 = 0.02;
 
 /// A polynomial over the samples of a recording.
 #[derive(Debug, Clone, PartialEq)]

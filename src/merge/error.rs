@@ -16,7 +16,7 @@ pub enum MergeError {
     #[error("no recording is given; give at least one")]
     NoSources,
     /// The rate of the output cannot be.
-    #[error("the output cannot have {rate}; ask for more than 0 and at most {most}")]
+    #[error("the output cannot have a rate of {rate}; ask for more than 0 and at most {most}")]
     Rate {
         /// The rate that was asked for.
         rate: Hertz,
