@@ -17,7 +17,7 @@ use hybank::pipeline::matching::{check_rate, common_rate};
 use hybank::quantity::{self, WrittenTime};
 use hybank::sine_fit::Estimate;
 use hybank::spec::{DesignOverrides, Spec};
-use hybank::units::Seconds;
+use hybank::units::{FastPeriods, Seconds};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -72,6 +72,11 @@ pub(super) struct Args {
     json: bool,
 }
 
+/// Paths as words of a command.
+fn words(paths: &[PathBuf]) -> String {
+    paths.iter().map(|path| shell_word(&path.display().to_string())).collect::<Vec<_>>().join(" ")
+}
+
 /// The recordings of all channels.
 struct Recordings {
     records: Vec<Record>,
@@ -101,7 +106,7 @@ pub(super) fn run(args: &Args) -> Result<(), Failure> {
     });
     // What the recordings have may explain why they do not fit; a report has these warnings.
     let (found, recordings) = found.inspect_err(|_| warnings.iter().for_each(|text| warn(text)))?;
-    let alone = found.alone.map_or_else(|| Alone::new(&found.spec), Ok).map_err(failed)?;
+    let alone = found.alone().map_err(failed)?;
     let written = file.with_values(&text, &found.spec, &args.output).map_err(|problem| {
         Failure::Input(format!("the values found make no spec: {problem}; nothing was written"))
     })?;
@@ -170,40 +175,46 @@ impl Args {
         Ok(AlignSettings { reference: reference(self.reference, spec)?, within })
     }
 
-    /// The commands that make one recording of these. Delays that move take a table of them, which needs the
-    /// band of a signal, or `merge`.
+    /// The commands that make one recording of these: a bank with its run, or `merge`.
     fn next(&self, found: &Alignment, rate: f64) -> Vec<String> {
-        let word = |path: &Path| shell_word(&path.display().to_string());
-        let of = |paths: &[PathBuf]| paths.iter().map(|path| word(path)).collect::<Vec<_>>().join(" ");
-        let is_file = self.captures.iter().chain([&self.output]).all(|path| !is_dash(path));
-        let (moves, spec) = (found.moves(), &found.spec);
-        // Such delays pass where the channels sample at one instant, and a bank takes zeros for samples.
-        let is_beyond = found.largest_move().is_some_and(|moved| moved.0 > spec.ratio as f64);
-        let has_band = spec.signal.as_ref().is_some_and(|signal| signal.band().is_some());
-        let is_for_bank = !found.has_lost_zeros() && !is_beyond && (!moves || has_band);
-        // Options that say what the recordings are would have to be said again.
-        let states_itself = self.reading.is_default();
-        let is_whole = found.channels.iter().all(|channel| channel.skip == 0);
-        let (inputs, table) = match self.written(found.channels.len()).split_last() {
-            Some((drift, trimmed)) if is_for_bank => {
-                (of(trimmed), if moves { format!(" --track {}", word(drift)) } else { String::new() })
-            }
-            None if is_whole && !moves && is_for_bank && states_itself => (of(&self.captures), String::new()),
-            _ => {
-                let command = || {
-                    let rate = rate * spec.ratio as f64;
-                    let seconds = |time: WrittenTime| time.in_seconds(spec.fast_period).0;
-                    let within =
-                        self.within.map(|time| format!(" --within {}s", seconds(time))).unwrap_or_default();
-                    format!("hybank merge {} -o merged.wav --rate {rate}Hz{within}", of(&self.captures))
-                };
-                let is_one_each = self.captures.len() == found.channels.len() && states_itself;
-                return (is_file && is_one_each).then(command).into_iter().collect();
-            }
+        if self.captures.iter().chain([&self.output]).any(|path| is_dash(path)) {
+            return Vec::new();
+        }
+        let Some(inputs) = self.inputs_of_bank(found) else {
+            return self.merge_command(found, rate).into_iter().collect();
         };
-        let design = format!("hybank design {} -o bank.json", word(&self.output));
-        let fuse = format!("hybank fuse bank.json {inputs} -o fused.wav{table}");
-        if is_file { vec![design, fuse] } else { Vec::new() }
+        let design = format!("hybank design {} -o bank.json", words(std::slice::from_ref(&self.output)));
+        vec![design, format!("hybank fuse bank.json {inputs} -o fused.wav")]
+    }
+
+    /// What `fuse` reads, if a bank suits these recordings. Delays that move take a table, which needs the
+    /// band of a signal. Those that move by more than a slow period pass where the channels sample at one
+    /// instant, and a bank takes zeros for samples.
+    fn inputs_of_bank(&self, found: &Alignment) -> Option<String> {
+        let spec = &found.spec;
+        let has_band = spec.signal.as_ref().is_some_and(|signal| signal.band().is_some());
+        let suits = |moved: FastPeriods| has_band && moved.0 <= spec.ratio as f64;
+        if found.has_lost_zeros() || !found.largest_move().is_none_or(suits) {
+            return None;
+        }
+        if let Some((drift, trimmed)) = self.written(found.channels.len()).split_last() {
+            let track = format!(" --track {}", words(std::slice::from_ref(drift)));
+            return Some(words(trimmed) + if found.moves() { &track } else { "" });
+        }
+        let is_whole = found.channels.iter().all(|channel| channel.skip == 0);
+        let suffices = is_whole && !found.moves() && self.reading.is_default();
+        suffices.then(|| words(&self.captures))
+    }
+
+    /// `None` where options that say what the recordings are would have to be said again.
+    fn merge_command(&self, found: &Alignment, rate: f64) -> Option<String> {
+        if self.captures.len() != found.channels.len() || !self.reading.is_default() {
+            return None;
+        }
+        let rate = rate * found.spec.ratio as f64;
+        let seconds = |time: WrittenTime| time.in_seconds(Seconds(1.0 / rate)).0;
+        let within = self.within.map(|time| format!(" --within {}s", seconds(time))).unwrap_or_default();
+        Some(format!("hybank merge {} -o merged.wav --rate {rate}Hz{within}", words(&self.captures)))
     }
 
     /// Writes all outputs, which appear together; `others` are those beside the spec.

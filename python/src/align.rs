@@ -31,8 +31,7 @@ pub(crate) fn align<'py>(
     let settings = AlignSettings { reference: reference_of(&spec, reference)?, within: within.map(Seconds) };
     let found = background::run(py, None, move |_| {
         let found = alignment::align(&spec, &all, settings).map_err(|error| error.to_string())?;
-        let alone =
-            found.alone.map_or_else(|| Alone::new(&found.spec), Ok).map_err(|error| error.to_string())?;
+        let alone = found.alone().map_err(|error| error.to_string())?;
         Ok::<_, String>((found, alone))
     })?;
     let (found, alone) = found.map_err(refused)?;

@@ -17,11 +17,11 @@ const LEAST_READINGS: usize = 16;
 const CLEARLY_LESS: f64 = 0.02;
 
 /// A polynomial over the samples of a recording.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Bend {
     middle: f64,
     half: f64,
-    /// Of Legendre's polynomials.
+    /// Of Legendre's polynomials; none for no bend.
     coefficients: Vec<f64>,
 }
 

@@ -52,7 +52,7 @@ pub struct ClockCourse {
     /// The lag over the samples with the steps mended. None for the reference.
     smooth: Option<LearnedSpline>,
     /// What the spline lacks of them.
-    bend: Option<Bend>,
+    bend: Bend,
     /// By their samples.
     steps: Vec<ClockStep>,
     /// Those that were not refused, by their pieces.
@@ -62,7 +62,7 @@ pub struct ClockCourse {
 impl ClockCourse {
     /// Of the reference itself.
     pub(super) fn reference() -> Self {
-        Self { smooth: None, bend: None, steps: Vec::new(), readings: Vec::new() }
+        Self { smooth: None, bend: Bend::default(), steps: Vec::new(), readings: Vec::new() }
     }
 
     /// Through readings of a recording with these steps. `None` if no spline goes through them, and with
@@ -77,7 +77,7 @@ impl ClockCourse {
         let kept = kept.into_iter().map(|k| readings[k]);
         let readings =
             kept.map(|reading| ClockReading { deviation: reading.deviation * smooth.scale(), ..reading });
-        Some(Self { readings: readings.collect(), smooth: Some(smooth), bend: Some(bend), steps })
+        Some(Self { readings: readings.collect(), smooth: Some(smooth), bend, steps })
     }
 
     /// The instant of a sample, in samples of the reference.
@@ -136,18 +136,14 @@ impl ClockCourse {
 
     /// By how much a sample of the mended recording is larger than its instant.
     pub(super) fn lag(&self, mended: f64) -> f64 {
-        self.smooth.as_ref().map_or(0.0, |smooth| smooth.value(mended)) + self.bent(mended)
+        self.smooth.as_ref().map_or(0.0, |smooth| smooth.value(mended)) + self.bend.at(mended)
     }
 
     /// The same with its deviation.
     pub(super) fn known(&self, mended: f64) -> Estimate<f64> {
         let Some(smooth) = &self.smooth else { return Estimate { value: 0.0, sigma: 0.0 } };
         let Known { value, deviation } = smooth.at(mended);
-        Estimate { value: value + self.bent(mended), sigma: deviation }
-    }
-
-    fn bent(&self, mended: f64) -> f64 {
-        self.bend.as_ref().map_or(0.0, |bend| bend.at(mended))
+        Estimate { value: value + self.bend.at(mended), sigma: deviation }
     }
 
     /// The sample of the mended recording that was taken at an instant.
@@ -225,7 +221,7 @@ mod tests {
             assert!(miss.abs() < 2e-6, "{k}: {miss:e}");
         }
         let straight = ClockCourse::new(readings(200, 20, 1e-6, |k| 3e-6 * k), Vec::new()).unwrap();
-        assert_eq!(straight.bent(3000.0), 0.0);
+        assert_eq!(straight.bend.at(3000.0), 0.0);
     }
 
     #[test]

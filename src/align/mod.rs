@@ -26,6 +26,7 @@ use crate::calibrate::{
     CalibrationSettings, CalibrationSignal, CalibrationWarning, ChannelEstimate, FittedValues, LevelChange,
     LevelCourses, Reading, Record, check, check_parts, line,
 };
+use crate::design::DesignError;
 use crate::figures::Alone;
 use crate::sine_fit::Estimate;
 use crate::spec::Spec;
@@ -89,15 +90,23 @@ pub struct Alignment {
     /// delay: or, if that is longer than a slow period, all delays of one. With the band of a signal it has
     /// its rms and the noise of the recorders.
     pub spec: Spec,
-    /// What one recorder gives, and all together, in the mean over these frames; `None` if the spec states
-    /// no band of the signal.
-    pub alone: Option<Alone>,
     /// What a reader of the values must know.
     pub warnings: Vec<AlignWarning>,
+    /// Over these frames; `None` if the spec states no band of the signal.
+    alone: Option<Alone>,
     clocks: Vec<ClockCourse>,
 }
 
 impl Alignment {
+    /// What one recorder gives, and all together: in the mean over the frames if the spec states the band of
+    /// the signal, else by the delays of the spec.
+    ///
+    /// # Errors
+    /// As [`Alone::new`].
+    pub fn alone(&self) -> Result<Alone, DesignError> {
+        self.alone.map_or_else(|| Alone::new(&self.spec), Ok)
+    }
+
     /// When the samples of the recording of a channel, from 0, were taken. The reference has its own time.
     ///
     /// ```text
@@ -128,7 +137,7 @@ impl Alignment {
 
     /// Whether a delay moves by so much that fixed taps lose by it.
     pub fn moves(&self) -> bool {
-        self.warnings.iter().any(|warning| matches!(warning, AlignWarning::FixedTaps { .. }))
+        self.largest_move().is_some()
     }
 
     /// The samples of a channel, from 0, without the steps of its recording: NaN for those that are lost or
@@ -320,7 +329,6 @@ fn alignment(
     let at: Vec<f64> = readings.iter().map(|reading| reading.frame as f64).collect();
     let changes = levels.changes(&at);
     let clocks = course.into_clocks();
-    let alone = None;
     Alignment {
         reference,
         channels,
@@ -330,8 +338,8 @@ fn alignment(
         readings,
         changes,
         spec,
-        alone,
         warnings,
+        alone: None,
         clocks,
     }
 }

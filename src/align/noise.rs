@@ -14,7 +14,7 @@ const REACH: usize = 24;
 
 impl Alignment {
     /// Measures the noise of each recorder and the rms of the signal, and writes both into the spec, if that
-    /// states the band of the signal: a sample is told from others by the band.
+    /// states the band of the signal: a sample is predicted from others by the band.
     ///
     /// The noise is all that a recorder does not have in common with the others. What the spec states is
     /// replaced, up to the rounding of its `bits`.

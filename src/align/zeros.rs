@@ -9,7 +9,7 @@ const LEAST_ZEROS: usize = 256;
 const SAME_LENGTH: f64 = 0.01;
 
 /// The zeros of each recording that are no samples: as such they would contradict those of the others. There
-/// are none where all recordings have rows of the same lengths: there the sound itself is silent. `rates`
+/// are none where all recordings have rows of the same lengths: there the sound itself is zero. `rates`
 /// are the samples per second of each, in any unit.
 pub(crate) fn lost_zeros(records: &[&Record], rates: &[f64]) -> Vec<Vec<Range<usize>>> {
     let rows: Vec<Vec<Range<usize>>> = records.iter().map(|record| long_rows(record)).collect();

@@ -255,6 +255,18 @@ fn noise_is_measured_and_the_commands_that_are_named_run() {
     // Without --trim, too.
     let merged = run(&desk.report(&align));
     assert!((number(&merged, "/predicted_snr_db") - predicted).abs() < 2.0, "{merged} {predicted}");
+    // What was said of the starts is said again, and options of the format are not lost.
+    let next = |more: &[&str]| desk.report(&[&align[..], more].concat())["next"].to_string();
+    assert!(next(&["--within", "1s"]).contains(" --within 1s\""));
+    assert_eq!(next(&["--channel", "1"]), "[]");
+    // A recording that was muted is merged: a bank would take its zeros for samples.
+    let mut muted = wav::samples(&desk, "c/ch2.wav");
+    muted[30_000..45_000].fill(0.0);
+    wav::write(&desk, "muted.wav", 1, 24_000, &muted);
+    let muted = ["align", "spec.toml", "c/ch1.wav", "muted.wav", "-o", "m.toml", "--trim", "cut2"];
+    let report = desk.report(&muted);
+    assert!(report["next"].to_string().contains("hybank merge"), "{report}");
+    assert!(report["warnings"].to_string().contains("zeros in rows"), "{report}");
 }
 
 /// The frequency of a slow sweep moves as its delay would: without its error the drift was -64 ppm.

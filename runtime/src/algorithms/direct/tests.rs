@@ -48,8 +48,16 @@ fn twin(taps: &[Vec<f64>], ratio: usize, input: &[f32], fused: bool) -> Vec<f32>
     (0..input.len() / n).flat_map(|k| (0..ratio).map(move |p| (k, p))).map(|(k, p)| output(k, p)).collect()
 }
 
-/// N, M, taps and frames.
-fn has_the_bits_of_the_twin((n, m, count, frames): (usize, usize, usize, usize), noise: &mut Noise) {
+/// A bank of N channels with M outputs a frame, and the frames that it runs.
+struct Shape {
+    n: usize,
+    m: usize,
+    taps: usize,
+    frames: usize,
+}
+
+fn has_the_bits_of_the_twin(shape: Shape, noise: &mut Noise) {
+    let Shape { n, m, taps: count, frames } = shape;
     let taps = random_taps(n, count, noise);
     let input = noise.samples(n * frames);
     for isa in Isa::available() {
@@ -60,9 +68,14 @@ fn has_the_bits_of_the_twin((n, m, count, frames): (usize, usize, usize, usize),
 
 #[test]
 fn small_shapes_every_tap_count_and_large_shapes_have_the_bits_of_the_scalar_twin() {
-    let small = (1..=9).flat_map(|n| (1..=17).map(move |m| (n, m, 1 + (7 * n + 5 * m) % 40, 100 + 13 * m)));
-    let counts = (1..=70).map(|count| (2, 2, count, count));
-    let large = [(40, 3), (3, 40), (33, 33)].map(|(n, m)| (n, m, 3 * m + 1, 300));
+    let small = (1..=9).flat_map(|n| {
+        (1..=17).map(move |m| {
+            let taps = 1 + (7 * n + 5 * m) % 40;
+            Shape { n, m, taps, frames: 100 + 13 * m }
+        })
+    });
+    let counts = (1..=70).map(|count| Shape { n: 2, m: 2, taps: count, frames: count });
+    let large = [(40, 3), (3, 40), (33, 33)].map(|(n, m)| Shape { n, m, taps: 3 * m + 1, frames: 300 });
     let mut noise = Noise(1);
     small.chain(counts).chain(large).for_each(|shape| has_the_bits_of_the_twin(shape, &mut noise));
 }
