@@ -90,7 +90,7 @@ fn explained(snr: f64) -> String {
         )
     } else {
         format!(
-            "the captures agree with the spec: errors that leave an SNR below about {snr:.0} dB would show"
+            "the captures agree with the spec: delays and gains that leave an SNR below about {snr:.0} dB would show"
         )
     }
 }
