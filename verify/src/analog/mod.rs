@@ -29,7 +29,6 @@ pub mod fit;
 mod half_power;
 mod pairing;
 mod polynomial;
-mod proportion;
 mod realise;
 mod roots;
 mod section;
@@ -38,7 +37,6 @@ mod square_free;
 mod strictly_proper;
 
 pub use cutoff::CutoffRemainder;
-pub use proportion::proportion;
 pub use section::Realisation;
 pub use signal::{SignalFilter, resolved_band, signal};
 pub use strictly_proper::enclosed;

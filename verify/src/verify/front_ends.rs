@@ -4,7 +4,7 @@
 use super::ball::{self, Ball, Matrix};
 use super::timeline::SamplingInstant;
 use super::{MAX_ANALOG_STATES, MAX_WORK, VerifyError};
-use crate::analog::{Realisation, SignalFilter, StrictlyProper, enclosed, proportion, signal};
+use crate::analog::{Realisation, SignalFilter, StrictlyProper, enclosed, signal};
 use crate::arithmetic::{Float, LongBall};
 use hybank_core::bank::Bank;
 use hybank_core::spec::FilterSpec;
@@ -18,7 +18,7 @@ pub(super) type Equations = Realisation<LongBall>;
 #[derive(Debug, Clone)]
 pub(super) struct FrontEnds {
     signal: Option<Equations>,
-    /// Filters that are exactly proportional count once.
+    /// Filters that are written alike count once.
     filters: Vec<FrontEnd>,
 }
 
@@ -47,19 +47,18 @@ impl FrontEnds {
         let mut all = Self::driven_by(signal);
         let mut seen: Vec<FilterSpec> = Vec::new();
         let mut index = |filter: &FilterSpec, name: &dyn Fn() -> String| {
-            let known = seen.iter().enumerate().find_map(|(i, other)| Some((i, proportion(filter, other)?)));
-            if let Some(known) = known {
+            if let Some(known) = seen.iter().position(|other| other == filter) {
                 return Ok(known);
             }
             StrictlyProper::driven_by(checked.as_ref(), filter, h).map_err(refused(name()))?;
             let equations = enclosed(all.signal.as_ref(), filter, h).map_err(refused(name()))?;
             seen.push(filter.clone());
-            Ok((all.push(equations), Ball::from(1.0)))
+            Ok(all.push(equations))
         };
-        let (target, gain) = index(&spec.target, &|| "spec.target.filter".to_owned())?;
+        let target = index(&spec.target, &|| "spec.target.filter".to_owned())?;
         let reference = |p: usize| GridTime::fast_sample(p as f64 - bank.latency as f64, h);
         let mut samples: Vec<SamplingInstant> = (0..bank.ratio)
-            .map(|p| SamplingInstant { filter: target, gain, converter_gain: 1.0, time: reference(p) })
+            .map(|p| SamplingInstant { filter: target, gain: Ball::from(1.0), time: reference(p) })
             .collect();
         let mut converters = Vec::with_capacity(spec.channels.len());
         for (i, channel) in spec.channels.iter().enumerate() {
@@ -67,13 +66,8 @@ impl FrontEnds {
         }
         let layout = spec.layout();
         for (converter, delay) in layout.owners().into_iter().zip(layout.waited_delays(&spec.delays())) {
-            let ((filter, gain), time) = (converters[converter], delay.negative());
-            samples.push(SamplingInstant {
-                filter,
-                gain,
-                converter_gain: spec.channels[converter].gain,
-                time,
-            });
+            let gain = Ball::from(spec.channels[converter].gain);
+            samples.push(SamplingInstant { filter: converters[converter], gain, time: delay.negative() });
         }
         Ok((all, samples))
     }
@@ -103,16 +97,6 @@ impl FrontEnds {
     /// The filter with this index.
     pub(super) fn filter(&self, index: usize) -> &Equations {
         &self.filters[index].equations
-    }
-
-    /// Gain of a sample over the output of its filter.
-    pub(super) fn gain(sample: &SamplingInstant) -> LongBall {
-        // A factor of one would only widen the enclosure.
-        match sample.converter_gain {
-            1.0 => sample.gain,
-            gain if sample.gain == Ball::from(1.0) => Ball::from(gain),
-            gain => sample.gain * Ball::from(gain),
-        }
     }
 
     /// Checks that the matrices of a slow period with `samples` samples are not too large.
@@ -154,9 +138,11 @@ impl FrontEnds {
     pub(super) fn output<F: Float>(&self, sample: &SamplingInstant) -> Matrix<F> {
         let FrontEnd { start, equations } = &self.filters[sample.filter];
         let mut row = ball::zeros(1, self.order());
-        let gain = Self::gain(sample);
-        let own =
-            if gain == Ball::from(1.0) { equations.c.clone() } else { ball::scaled(&equations.c, gain) };
+        // A factor of one would only widen the enclosure.
+        let own = match sample.gain {
+            gain if gain == Ball::from(1.0) => equations.c.clone(),
+            gain => ball::scaled(&equations.c, gain),
+        };
         row.columns_mut(*start, equations.order()).copy_from(&own);
         ball::shortened(&row)
     }

@@ -13,10 +13,8 @@ const MAX_PERIODS_LATE: f64 = (1u64 << 40) as f64;
 pub(super) struct SamplingInstant {
     /// Index of the filter.
     pub(super) filter: usize,
-    /// The output of the sample's own filter over that filter's, not zero.
+    /// The sample over the output of the filter, not zero.
     pub(super) gain: LongBall,
-    /// The sample over the output of its own filter, not zero.
-    pub(super) converter_gain: f64,
     pub(super) time: GridTime,
 }
 
@@ -65,8 +63,7 @@ mod tests {
         let exact = (60_000.000_000_02_f64 - 60_000.000_000_005) / 0.1;
         assert!((apart.nearest() / exact - 1.0).abs() < 1e-15 && apart.radius() < 1e-30 * exact, "{apart:?}");
         assert_eq!(between::<Float512>(at(0.3), at(0.3)), Ball::ZERO);
-        let (gain, converter_gain) = (Ball::from(1.0), 1.0);
-        let sample = |t| SamplingInstant { filter: 0, gain, converter_gain, time: at(t) };
+        let sample = |t| SamplingInstant { filter: 0, gain: Ball::from(1.0), time: at(t) };
         let far = timeline(&[sample(0.0), sample(-1e100)], 2);
         assert!(matches!(far, Err(VerifyError::TooLate { periods }) if periods > 1e100));
     }

@@ -140,9 +140,9 @@ impl Remainders<'_> {
         let bound = |(instant, &converter): (&SamplingInstant, &usize)| {
             let half_widths = HalfWidths::of(errors, converter);
             let first_order = self.known_of_slopes(instant.filter, half_widths, &mut known);
-            let gain = FrontEnds::gain(instant).magnitude();
-            let own = instant.converter_gain.abs() * self.of_cutoff(converter, half_widths.cutoff)?;
-            Ok((1.0 + half_widths.gain) * (gain * first_order + own) * OUTWARD)
+            let own = self.of_cutoff(converter, half_widths.cutoff)?;
+            let gain = (1.0 + half_widths.gain) * instant.gain.magnitude();
+            Ok(gain * (first_order + own) * OUTWARD)
         };
         instants.iter().zip(owners).map(bound).collect()
     }

@@ -94,7 +94,6 @@ pub(super) fn row_norm(signal: Option<&Equations>, filter: Equations, ratio: usi
     let sample = SamplingInstant {
         filter: front_ends.push(filter),
         gain: Ball::from(1.0),
-        converter_gain: 1.0,
         time: GridTime::fast_sample(0.0, Seconds(1.0)),
     };
     let short = square_of_row::<DoubleDouble>(&front_ends, &sample, ratio);
