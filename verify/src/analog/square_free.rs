@@ -1,16 +1,12 @@
 //! The square-free factors of a polynomial: its multiple roots, found exactly.
 //!
 //! Coefficients in doubles are whole numbers times a power of two, so greatest common divisors of
-//! polynomials are computed with integers. Nearly every polynomial is shown to have simple roots only by one
-//! common divisor modulo a prime.
+//! polynomials are computed with integers.
 
 use num_bigint::{BigInt, BigUint, Sign};
 
 use crate::arithmetic::Float512;
 
-/// 2^61 - 1, a prime. A polynomial with a multiple root has one modulo every prime that does not divide its
-/// leading coefficient, and none of 53 bits is a multiple of this one.
-const PRIME: u64 = (1 << 61) - 1;
 /// Bits of each piece in which an integer is handed to 512-bit arithmetic: every piece is exact in a double.
 const PIECE_BITS: u64 = 48;
 /// Pieces that are handed over: the 512 bits end within the last one.
@@ -27,10 +23,6 @@ pub(super) struct SquareFreeFactor {
 /// The factors of the polynomial with these coefficients in descending powers, of which the first and the
 /// last one are not zero. Their product is the polynomial up to a constant.
 pub(super) fn square_free_factors(coefficients: &[f64]) -> Vec<SquareFreeFactor> {
-    if has_simple_roots(coefficients) {
-        let coefficients = coefficients.iter().map(|&x| Float512::from(x)).collect();
-        return vec![SquareFreeFactor { coefficients, multiplicity: 1 }];
-    }
     // Entry k - 1: the product of all roots that occur k times and more, each once.
     let mut layers = Vec::new();
     let mut rest = primitive(whole(coefficients));
@@ -55,46 +47,6 @@ fn dyadic(value: f64) -> (i64, i64) {
     let zeros = if size == 0 { 0 } else { size.trailing_zeros() };
     let mantissa = size >> zeros;
     (if value < 0.0 { -mantissa } else { mantissa }, field.max(1) - 1075 + i64::from(zeros))
-}
-
-/// Whether the polynomial has no common divisor with its derivative modulo [`PRIME`].
-fn has_simple_roots(coefficients: &[f64]) -> bool {
-    let p: Vec<u64> = coefficients.iter().map(|&x| remainder(x)).collect();
-    let n = p.len() - 1;
-    let slope = p[..n].iter().enumerate().map(|(i, &x)| product(x, (n - i) as u64)).collect();
-    let (mut a, mut b): (Vec<u64>, Vec<u64>) = (p, slope);
-    while b.len() > 1 {
-        // a mod b.
-        while a.len() >= b.len() {
-            let factor = product(a[0], power(b[0], PRIME - 2));
-            for (x, &y) in a.iter_mut().zip(&b) {
-                *x = (*x + PRIME - product(factor, y)) % PRIME;
-            }
-            a.remove(0);
-        }
-        let start = a.iter().position(|&x| x != 0).unwrap_or(a.len());
-        (a, b) = (b, a.split_off(start));
-    }
-    !b.is_empty()
-}
-
-fn remainder(value: f64) -> u64 {
-    let (mantissa, exponent) = dyadic(value);
-    // 2^61 leaves the remainder 1.
-    let size = product(mantissa.unsigned_abs(), 1 << exponent.rem_euclid(61));
-    if mantissa < 0 { (PRIME - size) % PRIME } else { size }
-}
-
-fn product(x: u64, y: u64) -> u64 {
-    (u128::from(x) * u128::from(y) % u128::from(PRIME)) as u64
-}
-
-fn power(x: u64, exponent: u64) -> u64 {
-    let bits = (0..64 - exponent.leading_zeros()).rev();
-    bits.fold(1, |y, bit| {
-        let square = product(y, y);
-        if exponent >> bit & 1 == 1 { product(square, x) } else { square }
-    })
 }
 
 /// The coefficients times a power of two that makes them whole.

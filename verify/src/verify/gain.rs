@@ -22,7 +22,7 @@ pub(super) fn square_of_gain<F: Float>(
     let weights = witness.reference.iter().map(|[re, im]| ComplexBall::new(Ball::from(*re), Ball::from(*im)));
     let reference = DMatrix::from_iterator(witness.reference.len(), 1, weights);
     let samples = error_samples(filters, ratio, z, &reference);
-    let error = ball::product(&spectrum::gram(period, z), &samples);
+    let error = spectrum::gram_times(period, z, &samples);
     let energy = samples.iter().zip(&error).fold(Ball::ZERO, |sum, (x, y)| sum + (x.conj() * *y).re);
     energy / reference.iter().fold(Ball::ZERO, |sum, x| sum + x.norm_sqr())
 }

@@ -122,41 +122,13 @@ fn inverse_norm<F: Float>(matrix: &Matrix<F>, inverse: &Mat) -> f64 {
     if 1.01 * q < 0.5 { 1.01 * sums(inverse) / (1.0 - 1.01 * q) } else { f64::NAN }
 }
 
-/// Gram matrix of all samples of a slow period at the point z of the unit circle: G G* of their responses G
-/// to the input.
-pub(super) fn gram<F: Float>(period: &SlowPeriod<F>, z: ComplexBall<F>) -> DMatrix<ComplexBall<F>> {
-    let (n, samples) = (period.order(), period.samples());
-    let resolvent = resolved(&period.transition, z, &ball::identity(n));
-    let phases = phases(period, z);
-    // G = [A D], A from the states and D = diag(d) of the inputs of this period.
-    let a = with_rows_times(&ball::product(&complex(&period.outputs), &resolvent), &phases);
-    let q = |i: usize, j: usize| period.gram[(i, j)];
-    let mut gram = DMatrix::from_element(samples, samples, ComplexBall::default());
-    for i in 0..samples {
-        // Row i of [A D] times the Gram matrix of states and inputs.
-        let sum = |column: usize| {
-            let own = phases[i].scaled(q(n + i, column));
-            (0..n).fold(own, |sum, k| sum + a[(i, k)].scaled(q(k, column)))
-        };
-        let of_states: Vec<ComplexBall<F>> = (0..n).map(sum).collect();
-        // The matrix is Hermitian.
-        for j in 0..=i {
-            let own = sum(n + j) * phases[j].conj();
-            let entry = (0..n).fold(own, |sum, k| sum + of_states[k] * a[(j, k)].conj());
-            gram[(j, i)] = entry.conj();
-            gram[(i, j)] = entry;
-        }
-        gram[(i, i)].im = Ball::ZERO;
-    }
-    gram
-}
-
 /// For each sample z^-k, k the periods by which it is late.
 fn phases<F: Float>(period: &SlowPeriod<F>, z: ComplexBall<F>) -> Vec<ComplexBall<F>> {
     period.delay_periods.iter().map(|&late| delay(z, late)).collect()
 }
 
-/// Gamma b, without Gamma.
+/// Gamma b with the Gram matrix Gamma of all samples of a slow period at the point z of the unit circle: G
+/// G* of their responses G to the input.
 pub(super) fn gram_times<F: Float>(
     period: &SlowPeriod<F>,
     z: ComplexBall<F>,

@@ -15,8 +15,7 @@ fn enclosed(error: &EnclosedErrorSystem<'_>, half: [f64; 2]) -> DMatrix<ComplexB
     let (bank, z) = (error.bank, spectrum::unit(half));
     let through = spectrum::filter_response(&bank.filters, bank.ratio, z);
     let combine = ball::above(&ball::identity(bank.ratio), &spectrum::adjoint(&through).map(|x| -x));
-    let gram = spectrum::gram(&error.period, z);
-    ball::product(&ball::product(&spectrum::adjoint(&combine), &gram), &combine)
+    ball::product(&spectrum::adjoint(&combine), &spectrum::gram_times(&error.period, z, &combine))
 }
 
 #[test]
