@@ -30,7 +30,7 @@ const MISSED_PEAK_LIMIT: usize = 8;
 pub(crate) fn synthesise(plant: &LiftedPlant, settings: &MethodSettings) -> Result<Synthesis, DesignError> {
     let mut exchange = exchange(plant, settings)?;
     let best = least_gamma(plant, settings.taps, &mut exchange)?;
-    Synthesis::of_least_gamma(plant, best.taps, best.peak, exchange.lower_for_all)
+    Synthesis::of_least_gamma(plant, best.taps, best.peak, exchange.lower)
 }
 
 /// The taps of [`synthesise`] alone.

@@ -9,7 +9,7 @@
 use super::{MethodSettings, Synthesis, fir, tap_lags};
 use crate::design::DesignError;
 use crate::design::error_grid::{AffineError, ErrorGrid, GridFrequency, LocatedPeak};
-use crate::design::exchange::{Exchange, Tolerances};
+use crate::design::exchange::Exchange;
 use crate::design::filters::FilterResponse;
 use crate::design::plant::LiftedPlant;
 use crate::design::uncertainty::box_plant::{BoxPlant, Combination};
@@ -31,10 +31,13 @@ struct Settings {
     /// Relative margin of that norm for the least mean square without errors: twice its accuracy, or
     /// nothing could be gained.
     norm_margin: f64,
+    /// Relative gap to which the mean square is least: a thousandth more error does not matter.
+    mean_square_gap: f64,
 }
 
 /// Of every design.
-const SETTINGS: Settings = Settings { no_gain: 1e-3, norm_accuracy: 1e-4, norm_margin: 2e-4 };
+const SETTINGS: Settings =
+    Settings { no_gain: 1e-3, norm_accuracy: 1e-4, norm_margin: 2e-4, mean_square_gap: 1e-3 };
 
 /// The comparison of a robust design with one that takes the errors for zero.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -92,7 +95,7 @@ pub(crate) fn synthesise(
 fn study_of(nominal: &Synthesis, search: &BoxSearch) -> Result<RobustStudy, DesignError> {
     let worst = search.worst(&nominal.filters)?;
     // Whatever the taps, each combination of errors alone has the error that no bank avoids.
-    let unavoidable = search.plant.moved(&worst.point).noncausal_bound()?.gain;
+    let unavoidable = search.plant.moved(&worst.combination).noncausal_bound()?.gain;
     let norms = RobustNorms { nominal: nominal.peak.gain, largest_found: worst.peak.gain };
     let errors = search.plant.errors.in_seconds(search.plant.problem.fast_period);
     Ok(RobustStudy {
@@ -105,8 +108,8 @@ fn study_of(nominal: &Synthesis, search: &BoxSearch) -> Result<RobustStudy, Desi
     })
 }
 
-/// The exchange, with what it found for the study. Where the taps are worse between the errors or
-/// frequencies that the search looks at, it is repeated with these.
+/// The exchange, with what it found for the study. Where the taps are worse between the frequencies that the
+/// search looks at, it is repeated with these.
 fn least_worst_norm(
     plant: &LiftedPlant,
     search: BoxSearch,
@@ -116,7 +119,7 @@ fn least_worst_norm(
     let mut exchange = exchange(plant, search, settings)?;
     let mut rounds = 0;
     let (taps, largest_found) = loop {
-        let found = exchange.optimise_at(Tolerances::gradual(SETTINGS.norm_accuracy))?;
+        let found = exchange.optimise_to(SETTINGS.norm_accuracy, SETTINGS.mean_square_gap)?;
         let taps = found.taps.impulse_responses(settings.taps);
         let worst = exchange.error.search.worst(&SynthesisFilters::Fir(taps.clone()))?;
         let enough = found.estimate.max(exchange.lower) * (1.0 + SETTINGS.norm_accuracy);
@@ -124,8 +127,8 @@ fn least_worst_norm(
         if worst.peak.gain <= enough || rounds == MISSED_ERROR_LIMIT || exchange.stop.is_due() {
             break (taps, worst.peak.gain);
         }
-        let scenario = exchange.error.search.include(&worst.point);
-        if !exchange.add(&[GridFrequency { frequency: worst.peak.frequency, scenario }]) {
+        let location = GridFrequency { frequency: worst.peak.frequency, scenario: worst.combination };
+        if !exchange.add(&[location]) {
             break (taps, worst.peak.gain);
         }
     };
@@ -135,7 +138,7 @@ fn least_worst_norm(
     scenarios.dedup();
     let study = RobustStudy {
         robust: RobustNorms { nominal: peak.gain, largest_found },
-        lower: exchange.lower_for_all.max(study.lower).min(largest_found),
+        lower: exchange.lower.max(study.lower).min(largest_found),
         scenarios: scenarios.len(),
         pairs: exchange.locations.len(),
         ..study
@@ -196,7 +199,7 @@ pub struct RobustNorms {
     pub largest_found: f64,
 }
 
-/// Limit on the number of times that an exchange is repeated with errors that it did not know.
+/// Limit on the number of times that an exchange is repeated with a peak that it did not know.
 const MISSED_ERROR_LIMIT: usize = 8;
 
 /// The box of a spec whose bank is to be robust: FIR for channels with errors.

@@ -1,10 +1,10 @@
 //! The search for the errors of a box for which a bank is worst, in double precision.
 //!
-//! At one frequency K = W - sum_i f_i h_i, and the rows h_i of a converter are those of a node that a
-//! [`BoxPlant`] holds. Let (u, v) be the singular vectors of the largest gain of one combination. The rows
-//! that maximise Re (u* K v) are found converter by converter, and their gain is no smaller: |K'| >= Re (u*
-//! K' v) >= Re (u* K v) = |K|. From several combinations at many frequencies this ends at the local maxima.
-//! Each of the largest is then followed between the nodes, and the norm of its plant is computed.
+//! At one frequency K = W - sum_i f_i h_i is affine in the rows h_i, which are nearly affine in the errors
+//! of a converter. The largest gain of what is affine lies at a corner, so corners are tried, and no
+//! errors: the errors of one converter after the other are exchanged for those of the largest gain until no
+//! exchange raises it. From several combinations at many frequencies this ends at the local maxima, and the
+//! norm of the largest ones is computed.
 //!
 //! So what is found is attained. That nothing larger was missed is not proven; `verify` has an upper bound.
 
@@ -14,38 +14,36 @@ use crate::design::error_grid::{self, Frequencies, GridFrequency, LocatedPeak};
 use crate::design::filters::FilterResponse;
 use crate::lti::peak::{Peak, local_maxima, refine};
 use hybank_core::bank::SynthesisFilters;
-use hybank_core::spec::ErrorPoint;
-use hybank_linalg::{CMat, Complex};
+use hybank_linalg::CMat;
 use std::cell::OnceCell;
 
 /// What the search of a box tolerates.
 struct Settings {
-    /// A step that raises the gain by less (relative) ends the ascent: what is left of it is rounding.
+    /// An exchange that raises the gain by less (relative) is none: what it gains is rounding.
     least_step: f64,
     /// Relative change of a gain at which the refinement of a peak ends: a hundredth of the accuracy of a
     /// robust norm.
     flat_gain: f64,
-    /// Share of the largest peak from which on others are followed between the nodes, too. Robust banks
-    /// have many that are nearly equal, and a node is off its peak by some percent.
+    /// Share of the largest peak from which on the norms of others are computed, too. Robust banks have many
+    /// that are nearly equal.
     near_worst: f64,
 }
 
 /// Of every search.
-const SETTINGS: Settings = Settings { least_step: 1e-9, flat_gain: 1e-6, near_worst: 0.9 };
+const SETTINGS: Settings = Settings { least_step: 1e-9, flat_gain: 1e-6, near_worst: 0.98 };
 
-/// Steps of an ascent; two or three suffice.
-const MAX_STEPS: usize = 16;
+/// Rounds over all converters; two or three suffice.
+const MOST_ROUNDS: usize = 16;
 /// Combinations that are carried from one frequency to the next.
 const CARRIED: usize = 3;
-/// Peaks that are followed between the nodes.
-const FOLLOWED: usize = 6;
-/// Halvings of the distance of the nodes while a peak is followed, from a quarter of the half-width: a gain
-/// is flat at its peak.
-const HALVINGS: i32 = 6;
+/// Corners whose gain is computed at a frequency; an ascent begins at the largest one too.
+const CORNERS: usize = 64;
+/// Combinations whose norm is computed.
+const NORMS: usize = 4;
 
 /// Errors with their norm.
 pub(in crate::design) struct WorstErrors {
-    pub(in crate::design) point: ErrorPoint,
+    pub(in crate::design) combination: Combination,
     pub(in crate::design) peak: Peak,
 }
 
@@ -76,14 +74,7 @@ impl BoxSearch {
     ) -> Result<Self, DesignError> {
         let frequencies = Frequencies::new(lags, &[&plant.plant.resonances()?, resonances].concat());
         let responses = frequencies.all.iter().map(|_| OnceCell::new()).collect();
-        Ok(Self { corners: plant.corners(), plant, frequencies, responses })
-    }
-
-    /// Makes the errors of `point` a combination; see [`BoxPlant::include`].
-    pub(in crate::design) fn include(&mut self, point: &ErrorPoint) -> Combination {
-        let combination = self.plant.include(point);
-        self.responses.fill_with(OnceCell::new);
-        combination
+        Ok(Self { corners: plant.corners(CORNERS), plant, frequencies, responses })
     }
 
     /// The errors of the largest norm of a bank found over the box; no errors are among those that are
@@ -92,16 +83,35 @@ impl BoxSearch {
     /// # Errors
     /// As [`BoxSearch::peaks`], and [`DesignError::Lti`] for unstable filters.
     pub(in crate::design) fn worst(&self, filters: &SynthesisFilters) -> Result<WorstErrors, DesignError> {
-        let at = |point: ErrorPoint| {
-            let peak = self.plant.moved(&point).bank_norm(filters)?;
-            Ok::<_, DesignError>(WorstErrors { point, peak })
+        let at = |combination: Combination| {
+            let peak = self.plant.moved(&combination).bank_norm(filters)?;
+            Ok::<_, DesignError>(WorstErrors { combination, peak })
         };
-        let without_errors = at(ErrorPoint::none(self.plant.options.len()))?;
+        let without_errors = at(self.no_errors())?;
         let response = FilterResponse::new(filters, self.plant.plant.ratio())?;
-        self.worst_points(&response)?.into_iter().try_fold(without_errors, |worst, point| {
-            let other = at(point)?;
+        self.worst_combinations(&response)?.into_iter().try_fold(without_errors, |worst, combination| {
+            let other = at(combination)?;
             Ok(if other.peak.gain > worst.peak.gain { other } else { worst })
         })
+    }
+
+    /// The combinations of the largest peaks, the worst first.
+    fn worst_combinations(&self, filters: &FilterResponse) -> Result<Vec<Combination>, DesignError> {
+        let found = self.sweep(filters, 0.0)?;
+        let most = found.iter().map(|found| highest(found)).fold(0.0, f64::max);
+        let mut peaks = self.peaks_among(&found, filters, SETTINGS.near_worst * most)?;
+        peaks.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let mut worst: Vec<Combination> = Vec::new();
+        for peak in peaks {
+            if worst.len() < NORMS && !worst.contains(&peak.location.scenario) {
+                worst.push(peak.location.scenario);
+            }
+        }
+        Ok(worst)
+    }
+
+    fn no_errors(&self) -> Combination {
+        vec![0; self.plant.options.len()]
     }
 
     /// The peaks over the frequencies above `level`, each with the combination of errors that attains it.
@@ -135,9 +145,10 @@ impl BoxSearch {
             .filter(|[_, peak, _]| peak.gain > error_grid::SETTINGS.prune_level * level)
         {
             let k = self.frequencies.all.partition_point(|omega| *omega < around[1].frequency);
-            for start in self.exchanged(&found[k], k, filters)? {
+            for start in &found[k] {
                 let peak = self.refined(&start.combination, around, filters)?;
-                let location = GridFrequency { frequency: peak.frequency, scenario: start.combination };
+                let scenario = start.combination.clone();
+                let location = GridFrequency { frequency: peak.frequency, scenario };
                 if peak.gain > level {
                     peaks.push(LocatedPeak { gain: peak.gain, location });
                 }
@@ -150,12 +161,10 @@ impl BoxSearch {
     /// frequencies are left out.
     fn sweep(&self, filters: &FilterResponse, level: f64) -> Result<Vec<Vec<Attained>>, DesignError> {
         let mut all: Vec<Vec<Attained>> = vec![Vec::new(); self.frequencies.all.len()];
-        let mut carried = vec![vec![0; self.plant.options.len()]];
+        let mut carried = vec![self.no_errors()];
         for &k in &self.frequencies.first {
-            let at = filters.at(self.frequencies.all[k]);
-            let mut starts = self.worst_corners(self.response(k), &at)?;
-            starts.append(&mut carried);
-            all[k] = self.ascended(starts, k, &at)?;
+            carried.push(self.worst_corner(k, filters)?);
+            all[k] = self.ascended(carried, k, filters)?;
             carried = combinations(&all[k]);
         }
         for pair in self.frequencies.first.windows(2) {
@@ -164,21 +173,24 @@ impl BoxSearch {
                 let starts = [combinations(low), combinations(high)].concat();
                 let between = pair[0] + 1..pair[1];
                 for (k, found) in between.clone().zip(&mut all[between]) {
-                    *found = self.ascended(starts.clone(), k, &filters.at(self.frequencies.all[k]))?;
+                    *found = self.ascended(starts.clone(), k, filters)?;
                 }
             }
         }
         Ok(all)
     }
 
-    /// Some corners of the box: those of the largest gains among [`BoxPlant::corners`].
-    fn worst_corners(&self, response: &BoxResponse, filters: &CMat) -> Result<Vec<Combination>, DesignError> {
-        let found = |corner: &Combination| {
-            Ok(Attained { gain: self.gain(response, filters, corner)?, combination: corner.clone() })
-        };
-        let mut corners = self.corners.iter().map(found).collect::<Result<Vec<_>, DesignError>>()?;
-        corners.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        Ok(combinations(&corners))
+    /// The corner of the largest gain.
+    fn worst_corner(&self, k: usize, filters: &FilterResponse) -> Result<Combination, DesignError> {
+        let (response, at) = (self.response(k), filters.at(self.frequencies.all[k]));
+        let mut worst = (0.0, self.no_errors());
+        for corner in &self.corners {
+            let gain = self.gain(response, &at, corner)?;
+            if gain > worst.0 {
+                worst = (gain, corner.clone());
+            }
+        }
+        Ok(worst.1)
     }
 
     /// Where the ascents from `starts` end, the worst first.
@@ -186,11 +198,12 @@ impl BoxSearch {
         &self,
         starts: Vec<Combination>,
         k: usize,
-        filters: &CMat,
+        filters: &FilterResponse,
     ) -> Result<Vec<Attained>, DesignError> {
+        let (response, at) = (self.response(k), filters.at(self.frequencies.all[k]));
         let mut all: Vec<Attained> = Vec::new();
         for start in starts {
-            let found = ascend(&self.plant, self.response(k), filters, start)?;
+            let found = self.ascend(response, &at, start)?;
             if all.iter().all(|known| known.combination != found.combination) {
                 all.push(found);
             }
@@ -200,30 +213,32 @@ impl BoxSearch {
         Ok(all)
     }
 
-    /// The same from `found`, where no other error of a single channel has a larger gain.
-    fn exchanged(
+    /// A combination from which no other error of a single converter has a larger gain.
+    fn ascend(
         &self,
-        found: &[Attained],
-        k: usize,
-        filters: &FilterResponse,
-    ) -> Result<Vec<Attained>, DesignError> {
-        let (response, at) = (self.response(k), filters.at(self.frequencies.all[k]));
-        let mut starts = Vec::new();
-        for Attained { mut gain, mut combination } in found.iter().cloned() {
+        response: &BoxResponse,
+        filters: &CMat,
+        mut combination: Combination,
+    ) -> Result<Attained, DesignError> {
+        let mut gain = self.gain(response, filters, &combination)?;
+        for _ in 0..MOST_ROUNDS {
+            let before = gain;
             for i in 0..combination.len() {
                 let mut best = combination[i];
                 for choice in 0..self.plant.options[i].len() {
                     combination[i] = choice;
-                    let other = self.gain(response, &at, &combination)?;
+                    let other = self.gain(response, filters, &combination)?;
                     if other > gain * (1.0 + SETTINGS.least_step) {
                         (gain, best) = (other, choice);
                     }
                 }
                 combination[i] = best;
             }
-            starts.push(combination);
+            if gain == before {
+                break;
+            }
         }
-        self.ascended(starts, k, &at)
+        Ok(Attained { gain, combination })
     }
 
     /// The gain of one combination.
@@ -233,7 +248,8 @@ impl BoxSearch {
         filters: &CMat,
         combination: &[usize],
     ) -> Result<f64, DesignError> {
-        Ok(hybank_linalg::largest_singular_value(&self.plant.error(response, filters, combination))?)
+        let error = &response.references - filters * self.plant.measurements(response, combination);
+        Ok(hybank_linalg::largest_singular_value(&error)?)
     }
 
     /// The peak of one combination over the frequencies.
@@ -256,64 +272,6 @@ impl BoxSearch {
     fn response(&self, k: usize) -> &BoxResponse {
         self.responses[k].get_or_init(|| self.plant.response(self.frequencies.all[k]))
     }
-
-    /// The points of the box where the gain is largest, the worst first, by the peaks between the nodes.
-    ///
-    /// # Errors
-    /// As [`BoxSearch::peaks`].
-    fn worst_points(&self, filters: &FilterResponse) -> Result<Vec<ErrorPoint>, DesignError> {
-        let found = self.sweep(filters, 0.0)?;
-        let most = found.iter().map(|found| highest(found)).fold(0.0, f64::max);
-        let mut peaks = self.peaks_among(&found, filters, SETTINGS.near_worst * most)?;
-        peaks.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let mut points: Vec<ErrorPoint> = Vec::new();
-        for peak in peaks {
-            let point = self.plant.point(&peak.location.scenario);
-            if points.len() < FOLLOWED && !points.contains(&point) {
-                points.push(self.followed(point, peak.location.frequency, filters)?);
-            }
-        }
-        Ok(points)
-    }
-
-    /// The local maximum near `point`, between the nodes too.
-    fn followed(
-        &self,
-        mut point: ErrorPoint,
-        frequency: f64,
-        filters: &FilterResponse,
-    ) -> Result<ErrorPoint, DesignError> {
-        let at = filters.at(frequency);
-        for halving in 2..2 + HALVINGS {
-            let near = self.plant.near(&point, 0.5f64.powi(halving));
-            let found = ascend(&near, &near.response(frequency), &at, vec![0; point.delays.len()])?;
-            point = near.point(&found.combination);
-        }
-        Ok(point)
-    }
-}
-
-/// A combination of locally largest gain, from `combination` on.
-fn ascend(
-    plant: &BoxPlant,
-    response: &BoxResponse,
-    filters: &CMat,
-    mut combination: Combination,
-) -> Result<Attained, DesignError> {
-    let mut gain = 0.0;
-    for _ in 0..MAX_STEPS {
-        let svd = hybank_linalg::svd(&plant.error(response, filters, &combination))?;
-        if svd.s[0] <= gain * (1.0 + SETTINGS.least_step) {
-            break;
-        }
-        gain = svd.s[0];
-        let (left, right) = (svd.u.columns(0, 1).into_owned(), svd.v.columns(0, 1).into_owned());
-        let direction = SingularPair { samples: &response.nodes * right, filters: left.ad_mul(filters) };
-        if !direction.improve(plant, &mut combination) {
-            break;
-        }
-    }
-    Ok(Attained { gain, combination })
 }
 
 /// The largest gain of combinations of which the worst comes first.
@@ -321,47 +279,6 @@ fn highest(found: &[Attained]) -> f64 {
     found.first().map_or(0.0, |found| found.gain)
 }
 
-/// The first combinations.
 fn combinations(found: &[Attained]) -> Vec<Combination> {
-    found.iter().take(CARRIED).map(|found| found.combination.clone()).collect()
-}
-
-/// u* F and H v for the singular vectors (u, v) of an error.
-struct SingularPair {
-    /// Of all nodes.
-    samples: CMat,
-    /// u* F.
-    filters: CMat,
-}
-
-impl SingularPair {
-    /// Lowers Re (u* F H v), channel by channel. Returns whether anything changed.
-    fn improve(&self, plant: &BoxPlant, combination: &mut Combination) -> bool {
-        let mut changed = false;
-        for i in 0..combination.len() {
-            let own = combination[i];
-            let mut best = (own, self.output(plant, combination));
-            for choice in 0..plant.options[i].len() {
-                combination[i] = choice;
-                let output = self.output(plant, combination);
-                if output < best.1 {
-                    best = (choice, output);
-                }
-            }
-            combination[i] = best.0;
-            changed |= best.0 != own;
-        }
-        changed
-    }
-
-    /// Re (u* F H v).
-    fn output(&self, plant: &BoxPlant, combination: &[usize]) -> f64 {
-        let chosen = |i: usize| plant.options[i][combination[i]];
-        let term = |i: usize| {
-            let gain = Complex::from(1.0 + chosen(i).gain);
-            let of = |(column, row): (usize, usize)| (self.filters[column] * self.samples[row] * gain).re;
-            plant.columns(i).zip(plant.rows(chosen(i).node)).map(of).sum::<f64>()
-        };
-        (0..combination.len()).map(term).sum()
-    }
+    found.iter().map(|found| found.combination.clone()).collect()
 }

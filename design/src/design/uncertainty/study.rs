@@ -5,6 +5,7 @@ use super::search::{BoxSearch, WorstErrors};
 use crate::design::filters::FilterResponse;
 use crate::design::limits::Stop;
 use crate::design::{DesignError, Problem, prove};
+use crate::lti::peak::Peak;
 use hybank_core::bank::Bank;
 use hybank_core::spec::{ErrorBox, ErrorPoint};
 use hybank_core::units::{Hertz, RadiansPerSlowPeriod, Seconds};
@@ -33,7 +34,7 @@ impl BoxStudy {
     pub fn new(bank: &Bank, errors: &ErrorBox) -> Result<Self, DesignError> {
         let h = bank.fast_period;
         let upper = prove::worst_case(bank, errors, &Stop::default())?;
-        let WorstErrors { point, peak } = worst_errors(bank, errors)?;
+        let (point, peak) = worst_errors(bank, errors)?;
         let attained = prove::proven_gain(&bank.with_errors(&point), peak.frequency)?;
         Ok(Self {
             errors: errors.in_seconds(h),
@@ -45,10 +46,11 @@ impl BoxStudy {
     }
 }
 
-/// The errors of the box with the largest norm found.
-fn worst_errors(bank: &Bank, errors: &ErrorBox) -> Result<WorstErrors, DesignError> {
+/// The errors of the box with the largest norm found, and that.
+fn worst_errors(bank: &Bank, errors: &ErrorBox) -> Result<(ErrorPoint, Peak), DesignError> {
     let filters = FilterResponse::new(&bank.filters, bank.ratio)?;
     let plant = BoxPlant::new(&Problem::of_bank(bank)?, errors)?;
-    let search = BoxSearch::new(plant, filters.lags(), filters.resonances())?;
-    search.worst(&bank.filters)
+    let search = BoxSearch::new(plant, filters.lags(), &filters.resonances())?;
+    let WorstErrors { combination, peak } = search.worst(&bank.filters)?;
+    Ok((search.plant.point(&combination), peak))
 }

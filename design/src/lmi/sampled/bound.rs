@@ -21,26 +21,8 @@ use hybank_linalg::{CMat, Complex, LinalgError, Mat};
 /// Thresholds tried between weak directions of tap space and rounding errors; the best bound counts.
 const CUTS: [f64; 3] = [1e-14, 1e-12, 1e-9];
 
-/// A lower bound, computed in doubles and not proven.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LowerBound {
-    /// `gamma(F) >= value` for the taps covered; never negative.
-    pub value: f64,
-    /// Whether all taps are covered: larger taps than those within the radius have a larger worst case in
-    /// any case. Otherwise the bound holds for taps up to a thousand times the size of those found.
-    pub covers_all: bool,
-}
-
-/// The taps for which a lower bound is computed: those of at most a size. The size of taps is
-/// `sqrt(sum_{p,i,j} (s_i F_j[p,i])^2)` with `s_i` the largest row norm of channel i over the points.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Coverage {
-    radius: f64,
-    is_all: bool,
-}
-
 /// A lower bound on the optimum of `problem` from any dual matrices, one for each point (each M x q), for
-/// all taps within `radius` (see [`Coverage`]). Uses nothing but the data and the inequality in the module's
+/// all taps of at most this [`size`]. Uses nothing but the data and the inequality in the module's
 /// text, less an estimate of the rounding errors of the sums.
 pub(crate) fn lower_bound(problem: &SampledProblem, dual: &[CMat], radius: f64) -> Result<f64, LinalgError> {
     let mut nuclear = 0.0;
@@ -83,7 +65,8 @@ fn strengths(problem: &SampledProblem) -> Vec<f64> {
     (0..problem.channels()).map(|i| norms(i).fold(0.0, f64::max)).collect()
 }
 
-/// Size of the taps, see [`Coverage`].
+/// Size of the taps: `sqrt(sum_{p,i,j} (s_i F_j[p,i])^2)` with `s_i` the largest row norm of channel i over
+/// the points.
 fn size(problem: &SampledProblem, taps: &FirMatrix) -> f64 {
     let strength = strengths(problem);
     let square =
@@ -93,20 +76,20 @@ fn size(problem: &SampledProblem, taps: &FirMatrix) -> f64 {
 
 /// The radius for which the bound is computed. Taps with a worst case below `gamma` satisfy `sum_l ||F
 /// H_l||_F^2 <= sum_l (||W_l||_F + sqrt(M) gamma)^2`, which confines them if the map from taps to responses
-/// is injective: then no others matter. Otherwise, or if that radius is very large, the radius is a large
-/// multiple of the taps found and of unit gain.
-pub(super) fn cover(
+/// is injective: then no others matter. Otherwise, or if that radius is very large, it is a thousand times
+/// the size of the taps found or of unit gain.
+pub(super) fn radius(
     problem: &SampledProblem,
     reduced: &Reduced,
     basis: &Basis,
     (taps, gamma): (&FirMatrix, f64),
-) -> Result<Coverage, LinalgError> {
+) -> Result<f64, LinalgError> {
     let reference = problem.points().iter().map(|p| p.w.norm()).fold(0.0, f64::max);
     let stated = SETTINGS.radius_factor * size(problem, taps).max(reference);
     let spread = (problem.rows() as f64).sqrt() * gamma;
     let image = problem.points().iter().map(|p| (p.w.norm() + spread).powi(2)).sum::<f64>().sqrt();
     let confined = image * basis.inverse_norm() * mix_norm(problem, reduced)?;
-    Ok(Coverage { radius: confined.min(stated), is_all: confined < stated })
+    Ok(confined.min(stated))
 }
 
 /// Largest growth from reduced taps to the size of taps; infinite if channels had to be dropped.
@@ -119,7 +102,7 @@ fn mix_norm(problem: &SampledProblem, reduced: &Reduced) -> Result<f64, LinalgEr
     Ok(hybank_linalg::singular_values(&scaled)?.first().copied().unwrap_or(0.0))
 }
 
-/// The best bound that the dual iterate `z` (blocks of order M + k1) gives.
+/// The best bound that the dual iterate `z` (blocks of order M + k1) gives for taps within `radius`.
 ///
 /// At an optimum `Z11` sits on the worst singular vectors, and `Y = [-Z12, Z11 W_rest]` in compressed
 /// inputs is `Z11 K / gamma`, a subgradient. Its first part is made orthogonal to all taps.
@@ -128,14 +111,13 @@ pub(super) fn from_iterate(
     reduced: &Reduced,
     basis: &Basis,
     z: &Batch,
-    coverage: Coverage,
-) -> Result<LowerBound, LinalgError> {
+    radius: f64,
+) -> Result<f64, LinalgError> {
     let mut value = 0.0;
     for cut in CUTS {
-        value =
-            f64::max(value, lower_bound(problem, &dual_matrices(reduced, basis, z, cut), coverage.radius)?);
+        value = f64::max(value, lower_bound(problem, &dual_matrices(reduced, basis, z, cut), radius)?);
     }
-    Ok(LowerBound { value, covers_all: coverage.is_all })
+    Ok(value)
 }
 
 fn dual_matrices(reduced: &Reduced, basis: &Basis, z: &Batch, cut: f64) -> Vec<CMat> {

@@ -43,7 +43,7 @@
 //! };
 //! let problem = SampledProblem::new((0..=32).map(point).collect(), vec![3]);
 //! let best = minimise(&problem, FINEST_GAP, &|| false)?;
-//! assert!((best.gamma - 0.125).abs() < 1e-8 && best.lower.value <= best.gamma);
+//! assert!((best.gamma - 0.125).abs() < 1e-8 && best.lower <= best.gamma);
 //! assert!((best.taps.lags()[1][(0, 0)] + 0.5).abs() < 1e-6);
 //! // A looser cap on the maximum gives a smaller mean square.
 //! let (square, cap) = (MeanSquareObjective::noiseless(vec![1.0 / 33.0; 33], 1), 1.1 * best.gamma);
@@ -64,7 +64,6 @@ mod problem;
 mod quadratic;
 mod worst_case;
 
-pub use bound::LowerBound;
 #[cfg(test)]
 pub(crate) use bound::lower_bound;
 #[cfg(test)]

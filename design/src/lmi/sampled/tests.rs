@@ -19,24 +19,23 @@ fn bank_problem(bank: &TestBank, omegas: &[f64], taps: usize) -> SampledProblem 
 
 /// `(gamma - lower) / gamma`, 0 when gamma is 0.
 fn relative_gap(s: &Solution) -> f64 {
-    if s.gamma > 0.0 { (s.gamma - s.lower.value).max(0.0) / s.gamma } else { 0.0 }
+    if s.gamma > 0.0 { (s.gamma - s.lower).max(0.0) / s.gamma } else { 0.0 }
 }
 
 /// What every result promises, whatever the problem.
 fn check(problem: &SampledProblem, s: &Solution) {
     assert_eq!(problem.worst(&s.taps).unwrap(), s.gamma);
-    assert!(s.lower.value <= s.gamma);
+    assert!(s.lower <= s.gamma);
 }
 
 fn report(name: &str, problem: &SampledProblem, s: &Solution, seconds: f64) {
     println!(
-        "{name}: solved {} gamma {:.10} lower {:.10} gap {:.1e} steps {} {:?} {} unknowns {} points {:.3} s",
+        "{name}: solved {} gamma {:.10} lower {:.10} gap {:.1e} steps {} {} unknowns {} points {:.3} s",
         s.is_solved,
         s.gamma,
-        s.lower.value,
+        s.lower,
         relative_gap(s),
         s.iterations,
-        s.lower,
         problem.lags().iter().sum::<usize>() * problem.channels(),
         problem.points().len(),
         seconds

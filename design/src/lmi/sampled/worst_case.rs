@@ -1,7 +1,7 @@
 //! Taps of least worst-case norm over the points.
 
 use super::basis::Basis;
-use super::bound::{self, LowerBound};
+use super::bound;
 use super::interior::{InteriorIterate, Objective, norm};
 use super::prepare::Reduced;
 use super::problem::SampledProblem;
@@ -20,8 +20,9 @@ pub struct Solution {
     pub taps: FirMatrix,
     /// Largest `sigma_max(K_l)` of these taps over the points.
     pub gamma: f64,
-    /// Lower bound on gamma for all taps of the same lags, rounding errors subtracted.
-    pub lower: LowerBound,
+    /// Lower bound on gamma for all taps of the same lags and of up to a thousand times the size of these,
+    /// computed, rounding errors subtracted.
+    pub lower: f64,
     /// Number of steps.
     pub iterations: usize,
 }
@@ -72,8 +73,7 @@ pub fn minimise(
 fn fixed(problem: &SampledProblem) -> Result<Solution, LinalgError> {
     let taps = problem.zero_taps();
     let gamma = problem.worst(&taps)?;
-    let lower = LowerBound { value: gamma, covers_all: true };
-    Ok(Solution { is_solved: true, taps, gamma, lower, iterations: 0 })
+    Ok(Solution { is_solved: true, taps, gamma, lower: gamma, iterations: 0 })
 }
 
 struct LeastGamma {
@@ -81,18 +81,18 @@ struct LeastGamma {
     floor: f64,
     taps: FirMatrix,
     gamma: f64,
-    lower: LowerBound,
+    lower: f64,
 }
 
 impl LeastGamma {
     fn new(problem: &SampledProblem, taps: FirMatrix) -> Result<Self, LinalgError> {
         let gamma = problem.worst(&taps)?;
         let floor = SETTINGS.gap_of_zero * problem.worst(&problem.zero_taps())?;
-        Ok(Self { floor, taps, gamma, lower: LowerBound { value: 0.0, covers_all: true } })
+        Ok(Self { floor, taps, gamma, lower: 0.0 })
     }
 
     fn relative_gap(&self) -> f64 {
-        let gap = (self.gamma - self.lower.value).max(0.0);
+        let gap = (self.gamma - self.lower).max(0.0);
         if gap <= self.floor { 0.0 } else { gap / self.gamma }
     }
 
@@ -138,12 +138,10 @@ impl Iterate for WorstCaseIteration<'_> {
     fn judged_gap(&mut self) -> Result<f64, LinalgError> {
         self.offer_taps()?;
         let best = &mut self.best;
-        let coverage = bound::cover(self.problem, self.reduced, self.basis, (&best.taps, best.gamma))?;
+        let radius = bound::radius(self.problem, self.reduced, self.basis, (&best.taps, best.gamma))?;
         let z = &self.engine.cone.z;
-        let lower = bound::from_iterate(self.problem, self.reduced, self.basis, z, coverage)?;
-        if lower.value > best.lower.value {
-            best.lower = lower;
-        }
+        let lower = bound::from_iterate(self.problem, self.reduced, self.basis, z, radius)?;
+        best.lower = best.lower.max(lower);
         Ok(best.relative_gap())
     }
 

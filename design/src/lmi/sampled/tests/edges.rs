@@ -56,7 +56,7 @@ fn an_iteration_whose_end_is_due_ends_at_once_with_its_best_taps() {
         check(&problem, &s);
         assert!(!s.is_solved);
         assert!(asked.get() <= before + 12, "{} {before}", asked.get());
-        assert!(s.gamma >= full.lower.value && s.lower.value <= full.gamma);
+        assert!(s.gamma >= full.lower && s.lower <= full.gamma);
         last = s.gamma;
         first = first.min(if before == 0 { s.gamma } else { first });
         asked.set(0);

@@ -94,7 +94,7 @@ proptest::proptest! {
         let s = minimise(&problem, FINEST_GAP, &|| false).unwrap();
         check(&problem, &s);
         let zero = problem.worst(&problem.zero_taps()).unwrap();
-                proptest::prop_assert!(s.gamma <= zero * (1.0 + 1e-12) && s.lower.value <= s.gamma * (1.0 + 1e-12));
-        proptest::prop_assert!(s.gamma - s.lower.value <= (1e-6 * s.gamma).max(1e-12 * zero), "{:?}", s);
+                proptest::prop_assert!(s.gamma <= zero * (1.0 + 1e-12) && s.lower <= s.gamma * (1.0 + 1e-12));
+        proptest::prop_assert!(s.gamma - s.lower <= (1e-6 * s.gamma).max(1e-12 * zero), "{:?}", s);
     }
 }
