@@ -66,6 +66,7 @@ impl CausalErrors {
     }
 
     /// The longest latency of the range.
+    #[cfg(test)]
     pub(super) fn longest(&self) -> usize {
         self.first + self.rms.len() - 1
     }
@@ -77,14 +78,9 @@ impl CausalErrors {
 
     /// The shortest latency whose error is within [`WORTHWHILE_DB`] of the least.
     pub(super) fn shortest(&self) -> usize {
-        self.first + shortest(&self.rms)
+        let least = self.least();
+        self.first + self.rms.iter().position(|rms| is_almost(*rms, least)).unwrap_or(0)
     }
-}
-
-/// The index of the first error that is within [`WORTHWHILE_DB`] of the least.
-pub(super) fn shortest(rms: &[f64]) -> usize {
-    let least = rms.iter().copied().fold(f64::INFINITY, f64::min);
-    rms.iter().position(|rms| is_almost(*rms, least)).unwrap_or(0)
 }
 
 /// Whether an error is within [`WORTHWHILE_DB`] of the least one.

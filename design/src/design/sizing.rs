@@ -8,7 +8,7 @@
 //! samples that their taps see. The number of taps follows from a [`Goal`].
 
 use super::DesignError;
-use super::causal_errors::{CausalErrors, is_almost, shortest};
+use super::causal_errors::{CausalErrors, is_almost};
 use super::filters;
 use super::fir_errors::{BankSize, check_reach};
 use super::length::{Goal, Lengths};
@@ -22,10 +22,6 @@ use super::realise::realise;
 use crate::lti::gramian::h2_norm;
 use hybank_core::bank::SynthesisFilters;
 use hybank_core::spec::{Method, Spec};
-
-/// Slow periods of latency without a better bank of the wanted order that end the search for one: the error
-/// of reduced banks is not monotonic in the latency.
-const FRUITLESS_PERIODS: usize = 4;
 
 /// Latency and number of taps of a bank: those of its spec, and what was chosen where the spec leaves them
 /// open.
@@ -143,10 +139,10 @@ fn middle(problem: &Problem, taps: usize) -> BankSize {
     BankSize { taps, latency: ((0.5 * (taps - 1) as f64 + mean).round() as usize).max(problem.wait) }
 }
 
-/// The shortest latency at which a bank with as few states as `spec` asks for is almost the best. The states
-/// that a long latency takes are missing elsewhere, so there is a best latency, which only designs show.
-/// `errors` are those of banks with any number of states: a latency at which these are worse than a bank
-/// that was found needs no design.
+/// The shortest latency at which a bank with as few states as `spec` asks for is almost the best, of those
+/// up to the latency of banks with any number of states, whose errors are `errors`. The states that a long
+/// latency takes are missing elsewhere, so there is a best latency, which only designs show. A latency at
+/// which banks with any number of states are worse than one that was found needs no design.
 ///
 /// # Errors
 /// [`DesignError`] of a design, where none succeeds.
@@ -156,63 +152,25 @@ fn latency_of_order(
     errors: &CausalErrors,
     comparison: SizingControl<'_>,
 ) -> Result<usize, DesignError> {
-    let first = errors.shortest();
-    let mut tried = Tried { errors: vec![f64::INFINITY; errors.longest() + 1], best: first, refused: None };
-    for latency in first..=errors.longest() {
-        let in_vain = latency > tried.best + FRUITLESS_PERIODS * problem.ratio;
-        if in_vain || is_almost(tried.least(), errors.least()) {
+    let (mut found, mut least, mut refused) = (Vec::new(), f64::INFINITY, None);
+    for latency in (problem.wait..=errors.shortest()).rev() {
+        if !is_almost(errors.rms(latency), least) {
             break;
         }
-        comparison.after(tried.count())?;
-        tried.note(latency, error_of_order(spec, &Problem { latency, ..problem.clone() }, comparison.stop));
+        comparison.after(found.len())?;
+        match error_of_order(spec, &Problem { latency, ..problem.clone() }, comparison.stop) {
+            Ok(error) => {
+                least = least.min(error);
+                found.push((latency, error));
+            }
+            Err(why) => refused = Some(why),
+        }
         comparison.go_on()?;
     }
-    for latency in (problem.wait..first).rev() {
-        if is_almost(errors.rms(latency), tried.least()) {
-            comparison.after(tried.count())?;
-            let problem = Problem { latency, ..problem.clone() };
-            tried.note(latency, error_of_order(spec, &problem, comparison.stop));
-            comparison.go_on()?;
-        }
-    }
-    tried.shortest()
-}
-
-/// Latencies at which banks were designed.
-struct Tried {
-    /// Whole errors of the banks, infinite without one.
-    errors: Vec<f64>,
-    /// The latency of the least one.
-    best: usize,
-    /// Why a latency has no bank.
-    refused: Option<DesignError>,
-}
-
-impl Tried {
-    fn least(&self) -> f64 {
-        self.errors[self.best]
-    }
-
-    fn count(&self) -> usize {
-        self.errors.iter().filter(|error| error.is_finite()).count()
-    }
-
-    fn note(&mut self, latency: usize, error: Result<f64, DesignError>) {
-        match error {
-            Ok(error) => self.errors[latency] = error,
-            Err(refused) => self.refused = Some(refused),
-        }
-        if self.errors[latency] < self.least() {
-            self.best = latency;
-        }
-    }
-
-    /// The shortest latency that is almost the best.
-    fn shortest(self) -> Result<usize, DesignError> {
-        match self.refused {
-            Some(refused) if self.errors[self.best].is_infinite() => Err(refused),
-            _ => Ok(shortest(&self.errors)),
-        }
+    let shortest = found.into_iter().rfind(|(_, error)| is_almost(*error, least));
+    match (shortest, refused) {
+        (None, Some(refused)) => Err(refused),
+        (shortest, _) => Ok(shortest.map_or(errors.shortest(), |(latency, _)| latency)),
     }
 }
 
