@@ -4,8 +4,7 @@ use super::DesignError;
 use crate::lti::peak::{resonances, stable_poles};
 use crate::lti::{FirMatrix, FrequencyResponse, StateSpace};
 use hybank_core::bank::{self, Bank, SynthesisFilters};
-use hybank_linalg::{CMat, Mat};
-use std::f64::consts::PI;
+use hybank_linalg::{CMat, Complex, Mat};
 
 impl FirMatrix {
     /// The polyphase components of filters `taps[i][n] = f_i[n]`.
@@ -27,21 +26,16 @@ impl FirMatrix {
 pub(crate) enum FilterResponse {
     /// A polynomial in z^-1.
     Polynomial(FirMatrix),
-    /// A recursion, and the angles of its resonances.
+    /// A recursion, and its poles.
     Recursive {
         /// F(z).
         response: FrequencyResponse,
-        /// Radians per slow period.
-        resonances: Vec<f64>,
+        /// In the plane of z.
+        poles: Vec<Complex<f64>>,
     },
 }
 
 impl FilterResponse {
-    /// Angles per lag of FIR filters between which their response is smooth.
-    const BREAKS_PER_LAG: f64 = 0.25;
-    /// Fewest and most of these angles.
-    const BREAKS: std::ops::RangeInclusive<f64> = 4.0..=512.0;
-
     /// Of the filters of a bank.
     ///
     /// # Errors
@@ -51,8 +45,8 @@ impl FilterResponse {
             SynthesisFilters::Fir(taps) => Self::Polynomial(FirMatrix::polyphase(taps, ratio)),
             SynthesisFilters::StateSpace(_) => {
                 let system = lifted(filters, ratio);
-                let resonances = resonances(&stable_poles(&system)?);
-                Self::Recursive { response: FrequencyResponse::new(&system), resonances }
+                let poles = stable_poles(&system)?;
+                Self::Recursive { response: FrequencyResponse::new(&system), poles }
             }
         })
     }
@@ -70,17 +64,14 @@ impl FilterResponse {
         if let Self::Polynomial(fir) = self { fir.lags().len() } else { 1 }
     }
 
-    /// Angles of the resonances of a recursion.
-    pub(crate) fn resonances(&self) -> &[f64] {
-        if let Self::Recursive { resonances, .. } = self { resonances } else { &[] }
+    /// The poles of a recursion, which has delay chains among its states too.
+    pub(crate) fn poles(&self) -> &[Complex<f64>] {
+        if let Self::Recursive { poles, .. } = self { poles } else { &[] }
     }
 
-    /// Angles from 0 to pi that part the response into smooth pieces.
-    pub(crate) fn breaks(&self) -> Vec<f64> {
-        let pieces =
-            (Self::BREAKS_PER_LAG * self.lags() as f64).clamp(*Self::BREAKS.start(), *Self::BREAKS.end());
-        let even = (1..pieces as usize).map(|k| PI * k as f64 / pieces.floor());
-        even.chain(self.resonances().iter().copied()).collect()
+    /// Angles of the resonances of a recursion.
+    pub(crate) fn resonances(&self) -> Vec<f64> {
+        resonances(self.poles())
     }
 }
 

@@ -109,8 +109,6 @@ pub(super) struct JointState {
     transition: StateTransition,
     b: Mat,
     c: Mat,
-    /// C A: the derivatives of the outputs, as far as the state determines them.
-    pub(super) slopes: Mat,
 }
 
 impl JointState {
@@ -120,10 +118,8 @@ impl JointState {
         let c: Vec<&Mat> = front_ends.iter().map(|filter| filter.c()).collect();
         let (b, c) = (hybank_linalg::vstack(&b), hybank_linalg::block_diagonal(&c));
         let Some(signal) = &problem.signal else {
-            let slopes: Vec<Mat> = front_ends.iter().map(|filter| filter.c() * filter.a()).collect();
             let blocks = front_ends.iter().map(|filter| filter.a().clone()).collect();
-            let slopes = hybank_linalg::block_diagonal(&slopes.iter().collect::<Vec<_>>());
-            return Self { transition: StateTransition::new(blocks), b, c, slopes };
+            return Self { transition: StateTransition::new(blocks), b, c };
         };
         let blocks: Vec<&Mat> = std::iter::once(signal.a()).chain(front_ends.iter().map(|f| f.a())).collect();
         let mut a = hybank_linalg::block_diagonal(&blocks);
@@ -131,7 +127,7 @@ impl JointState {
         a.view_mut((own, 0), (b.nrows(), own)).copy_from(&(&b * signal.c()));
         let b = hybank_linalg::vstack(&[signal.b(), &(b * signal.d())]);
         let c = hybank_linalg::hstack(&[&Mat::zeros(c.nrows(), own), &c]);
-        Self { slopes: &c * &a, transition: StateTransition::new(vec![a]), b, c }
+        Self { transition: StateTransition::new(vec![a]), b, c }
     }
 
     pub(super) fn order(&self) -> usize {
@@ -141,11 +137,6 @@ impl JointState {
     /// Row i reads front end i.
     pub(super) fn c(&self) -> &Mat {
         &self.c
-    }
-
-    /// e^{A l}.
-    pub(super) fn transition(&self, length: f64) -> Mat {
-        self.transition.over(length)
     }
 
     /// (e^{A l}, S) of a segment of length l: x <- e^{A l} x + S w with S S* = G(l).

@@ -3,7 +3,6 @@
 
 pub mod analysis;
 mod causal_errors;
-mod covariances;
 mod designer;
 mod deviations;
 mod error;
@@ -12,6 +11,7 @@ mod exchange;
 mod figure_band;
 pub mod filters;
 mod fir_errors;
+mod jitter;
 mod known_instants;
 mod length;
 mod lifting;
@@ -52,6 +52,7 @@ pub use methods::robust_fir::{RobustNorms, RobustStudy};
 pub use missing::MissingSamples;
 pub use plant::LiftedPlant;
 pub use problem::Problem;
+pub(crate) use quadrature::{Integrand, QuadratureNode};
 pub use reduction::{OrderErrorPoint, OrderReduction};
 pub use responses::error_response;
 pub(crate) use signal::{AliasColumns, SampledSignal};

@@ -1,7 +1,6 @@
 //! From a spec to its problem in normalised time.
 
 use super::DesignError;
-use super::covariances::Covariances;
 use super::problem::{Channel, Problem};
 use hybank_core::spec::{Band, ConverterErrors, ErrorPoint, FilterSpec, Spec};
 use hybank_core::units::{GridTime, RadiansPerFastPeriod};
@@ -56,7 +55,7 @@ impl Problem {
     /// `spec` and the front ends of this problem.
     pub(super) fn noise_powers(&self, spec: &Spec) -> Result<Vec<f64>, DesignError> {
         let scale = input_scale(spec, self.signal.as_ref(), &self.front_ends[self.target]);
-        let jitter = self.jitter_powers(spec)?;
+        let jitter = self.jitter_powers(spec);
         let power = |(channel, jitter): (&Channel, f64)| {
             spec.channels[channel.converter].sample_noise().powi(2) * scale + jitter
         };
@@ -66,16 +65,12 @@ impl Problem {
     /// Power of the noise by which the jitter of each channel of `spec` shows, relative to an input of unit
     /// density: the mean square of what the front end's output changes meanwhile. It grows with the signal,
     /// so it needs no full scale.
-    fn jitter_powers(&self, spec: &Spec) -> Result<Vec<f64>, DesignError> {
-        if spec.channels.iter().all(|channel| channel.jitter.0 == 0.0) {
-            return Ok(vec![0.0; self.channels.len()]);
-        }
-        let covariances = Covariances::new(self)?;
+    fn jitter_powers(&self, spec: &Spec) -> Vec<f64> {
         let power = |channel: &Channel| {
             let deviation = spec.channels[channel.converter].jitter.in_fast_periods(spec.fast_period);
-            channel.gain * channel.gain * covariances.change(channel.front_end, deviation)
+            channel.gain * channel.gain * self.change(channel.front_end, deviation)
         };
-        Ok(self.channels.iter().map(power).collect())
+        self.channels.iter().map(power).collect()
     }
 
     /// The jitter's part of the noise of each sample of a frame of `spec`, over the power of the target.
@@ -84,8 +79,8 @@ impl Problem {
     /// As [`Problem::new`].
     pub(crate) fn jitter_shares(spec: &Spec, latency: usize) -> Result<Vec<f64>, DesignError> {
         let problem = Self::new(spec, latency)?;
-        let power = Covariances::new(&problem)?.power(problem.target);
-        Ok(problem.jitter_powers(spec)?.into_iter().map(|jitter| jitter / power).collect())
+        let power = problem.output_power(problem.target);
+        Ok(problem.jitter_powers(spec).into_iter().map(|jitter| jitter / power).collect())
     }
 
     /// The same problem with errors of its converters; the delays may become negative.
@@ -163,7 +158,7 @@ mod tests {
             // The step of ten bits is 2^-9.
             assert!((bits / noise - 2f64.powi(-18) / 12.0 / 1e-6).abs() < 1e-12 * bits / noise);
             let plain = problem(signal, "noise = 0");
-            let power = Covariances::new(&plain).unwrap().power(plain.target);
+            let power = plain.output_power(plain.target);
             let full_scale = if signal.is_empty() { 1.0 } else { power / 0.01 };
             assert!((noise / (1e-6 * full_scale) - 1.0).abs() < 1e-9, "{noise} {full_scale}");
             // 0.01 fast periods: (2 pi f 1e-5)^2 for some f of the band.

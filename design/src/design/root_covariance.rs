@@ -53,7 +53,7 @@ impl RootCovariance {
     ) -> Self {
         let problem = Problem { latency: 0, ..problem.clone() };
         let signal = SampledSignal::of(&problem);
-        let nodes = integrand(&problem, &signal, frames, &instants);
+        let nodes = nodes(&problem, &signal, frames, &instants);
         let mut columns = RootColumns::new(&problem, frames, instants.clone());
         for node in nodes {
             columns.add(&signal, deviations, node);
@@ -144,7 +144,7 @@ impl PartialHistory<'_> {
     }
 }
 
-fn integrand(
+fn nodes(
     problem: &Problem,
     signal: &SampledSignal,
     frames: usize,
@@ -153,10 +153,7 @@ fn integrand(
     let ratio = problem.ratio as f64;
     let oldest = -problem.longest_delay().0 - frames as f64 * ratio;
     let reach = (*instants.end() as f64).max(0.0) - oldest.min(*instants.start() as f64);
-    let own = signal.problem().signal.iter().flat_map(|filter| filter.poles());
-    let poles = problem.front_ends.iter().flat_map(|filter| filter.poles()).chain(own);
-    let poles: Vec<Complex<f64>> = poles.map(|pole| pole * ratio).collect();
-    Integrand { breaks: signal.breaks(), periods: 1.0 + reach / ratio, poles: &poles }.nodes()
+    Integrand { breaks: signal.breaks(), periods: 1.0 + reach / ratio, poles: &signal.poles() }.nodes()
 }
 
 /// The columns of the roots of samples and targets, while they are collected.

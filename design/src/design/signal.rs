@@ -107,11 +107,17 @@ impl SampledSignal {
         match &self.band {
             Some(band) => vec![folded(*band.start()), folded(*band.end())],
             None => {
-                let own = self.problem.signal.iter().flat_map(|filter| filter.poles());
-                let poles = self.problem.front_ends.iter().flat_map(|filter| filter.poles()).chain(own);
-                poles.filter(|pole| pole.im > 0.0).map(|pole| folded(pole.im)).collect()
+                let upper = self.poles().into_iter().filter(|pole| pole.im > 0.0);
+                upper.map(|pole| folded(pole.im / self.problem.ratio as f64)).collect()
             }
         }
+    }
+
+    /// The poles of the front ends and of its own filter, for a slow period.
+    pub(crate) fn poles(&self) -> Vec<Complex<f64>> {
+        let own = self.problem.signal.iter().flat_map(|filter| filter.poles());
+        let all = self.problem.front_ends.iter().flat_map(|filter| filter.poles()).chain(own);
+        all.map(|pole| pole * self.problem.ratio as f64).collect()
     }
 
     /// The columns at theta, radians per slow period.

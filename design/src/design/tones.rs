@@ -65,8 +65,8 @@ pub(crate) struct PeriodicFilters<'a> {
     pub(crate) at: Box<dyn Fn(f64) -> CMat + 'a>,
     /// Slow periods that the filters see.
     pub(crate) lags: usize,
-    /// Angles from 0 to pi between which F is smooth.
-    pub(crate) breaks: Vec<f64>,
+    /// Angles from 0 to pi at which F may have narrow peaks.
+    pub(crate) resonances: Vec<f64>,
 }
 
 /// A bank, or another way, that answers tones.
@@ -94,8 +94,8 @@ impl<'a> ToneResponse<'a> {
         spread: Vec<Deviations>,
     ) -> Result<Self, DesignError> {
         let filters = FilterResponse::new(filters, problem.ratio)?;
-        let (lags, breaks) = (filters.lags(), filters.breaks());
-        let filters = PeriodicFilters { at: Box::new(move |theta| filters.at(theta)), lags, breaks };
+        let (lags, resonances) = (filters.lags(), filters.resonances());
+        let filters = PeriodicFilters { at: Box::new(move |theta| filters.at(theta)), lags, resonances };
         Ok(Self::new(filters, problem, spread))
     }
 
@@ -177,9 +177,9 @@ impl<'a> ToneResponse<'a> {
         let step = (high.0 - low.0) / wanted.min(SETTINGS.most_work / work as f64).max(100.0).floor();
         let even = (0..=((high.0 - low.0) / step).round() as usize).map(|k| low.0 + step * k as f64);
         let turns = (low.0 * period).floor() as i64..=(high.0 * period).ceil() as i64;
-        let breaks = &self.filters.breaks;
+        let resonances = &self.filters.resonances;
         let folded = turns.flat_map(|turn| {
-            breaks.iter().flat_map(move |b| [b / TAU, -b / TAU].map(|x| (turn as f64 + x) / period))
+            resonances.iter().flat_map(move |b| [b / TAU, -b / TAU].map(|x| (turn as f64 + x) / period))
         });
         let inside = folded.filter(|f| (low.0..=high.0).contains(f));
         let mut all: Vec<f64> = even.map(|f| f.min(high.0)).chain(inside).collect();

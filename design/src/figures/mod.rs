@@ -25,7 +25,6 @@
 //! without any noise one channel alone would be exact wherever the signal fits into it.
 
 mod correction;
-mod integral;
 mod powers;
 mod reconstruction;
 mod setup;

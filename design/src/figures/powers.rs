@@ -1,16 +1,17 @@
 //! Mean squares of the errors of reconstructions: from the signal, from the noise of the converters, and
 //! from delays, gains and offsets that are not known exactly.
 
-use super::integral::mean_over_circle;
 use super::reconstruction::Reconstruction;
-use crate::design::{AliasColumns, Deviations, SampledSignal};
+use crate::design::{AliasColumns, Deviations, Integrand, QuadratureNode, SampledSignal};
 use hybank_linalg::{CMat, Complex};
 use std::ops::Range;
 
 /// Multiply-adds that an integral may take, about: a second or two.
 const MOST_WORK: f64 = 1e9;
-/// Fewest and most angles of an integral.
-const ANGLES: std::ops::RangeInclusive<f64> = 120.0..=40_000.0;
+/// Angles of a rule for each slow period that its integrand reaches over.
+const ANGLES_PER_PERIOD: f64 = 4.0;
+/// Slow periods over which usual ways and front ends reach beside delays and filters.
+const MEMORY: usize = 16;
 
 /// What a mean square error is computed for.
 pub(super) struct Conditions {
@@ -56,28 +57,24 @@ pub(super) struct Powers {
 
 /// The mean square of the target.
 pub(super) fn target_power(signal: &SampledSignal) -> f64 {
-    let work = signal.columns() * signal.problem().ratio;
-    let breaks = even_and(signal.breaks());
-    let power =
-        mean_over_circle(&breaks, angles(work), &mut |theta| vec![signal.at(theta).reference.norm_squared()]);
-    power.first().copied().unwrap_or(0.0) / signal.problem().ratio as f64
+    let at = |QuadratureNode { theta, share }| share * signal.at(theta).reference.norm_squared();
+    nodes(signal, &[]).into_iter().map(at).sum::<f64>() / signal.problem().ratio as f64
 }
 
 impl Conditions {
     /// The mean squares of the errors of all `ways`, at the same angles.
     pub(super) fn powers(&self, ways: &[Reconstruction]) -> Vec<Powers> {
-        let problem = self.signal.problem();
-        let size = problem.ratio * problem.channels.len();
-        let work: usize = ways.iter().map(|way| size * (way.lags() + self.signal.columns())).sum();
-        let breaks =
-            even_and(self.signal.breaks().into_iter().chain(ways.iter().flat_map(Reconstruction::breaks)));
-        let means = mean_over_circle(&breaks, angles(work), &mut |theta| {
+        let mut means = vec![[0.0; 6]; ways.len()];
+        for QuadratureNode { theta, share } in nodes(&self.signal, ways) {
             let columns = self.signal.at(theta);
             let late = self.late(&columns);
-            ways.iter().flat_map(|way| self.at(way, theta, &columns, late.as_ref())).collect()
-        });
-        let per_sample = 1.0 / problem.ratio as f64;
-        let powers = |(way, p): (&Reconstruction, &[f64])| Powers {
+            for (mean, way) in means.iter_mut().zip(ways) {
+                let here = self.at(way, theta, &columns, late.as_ref());
+                mean.iter_mut().zip(here).for_each(|(sum, square)| *sum += share * square);
+            }
+        }
+        let per_sample = 1.0 / self.signal.problem().ratio as f64;
+        let powers = |(way, p): (&Reconstruction, [f64; 6])| Powers {
             signal: p[0] * per_sample,
             late: p[1] * per_sample,
             gains: p[2] * per_sample,
@@ -88,7 +85,7 @@ impl Conditions {
                 jitter: p[5] * per_sample,
             },
         };
-        ways.iter().zip(means.chunks_exact(6)).map(powers).collect()
+        ways.iter().zip(means).map(powers).collect()
     }
 
     /// F of a way at an angle with these columns.
@@ -165,12 +162,18 @@ fn error(columns: &AliasColumns, filters: &CMat) -> f64 {
     error.norm_squared()
 }
 
-/// Angles that an integral of so many multiply-adds per angle may evaluate.
-fn angles(work: usize) -> usize {
-    (MOST_WORK / work as f64).clamp(*ANGLES.start(), *ANGLES.end()) as usize
-}
-
-/// The given angles, and some to begin with.
-fn even_and(breaks: impl IntoIterator<Item = f64>) -> Vec<f64> {
-    breaks.into_iter().chain((1..4).map(|k| std::f64::consts::FRAC_PI_4 * f64::from(k))).collect()
+/// The angles of the integrals of all `ways`.
+fn nodes(signal: &SampledSignal, ways: &[Reconstruction]) -> Vec<QuadratureNode> {
+    let problem = signal.problem();
+    let size = problem.ratio * (1 + problem.channels.len());
+    let work: usize = signal.columns() * size
+        + ways.iter().map(|way| size * (way.lags() + signal.columns())).sum::<usize>();
+    let reach = (problem.latency as f64 + problem.longest_delay().0) / problem.ratio as f64;
+    let memory = ways.iter().map(|way| way.lags() + way.poles().len()).max().unwrap_or(0) + MEMORY;
+    let most = MOST_WORK / (ANGLES_PER_PERIOD * work as f64);
+    // In the plane of theta.
+    let own = ways.iter().flat_map(Reconstruction::poles).map(|pole| pole.ln());
+    let poles: Vec<Complex<f64>> = signal.poles().into_iter().chain(own).collect();
+    let periods = (reach + memory as f64).min(most).max(MEMORY as f64);
+    Integrand { breaks: signal.breaks(), periods, poles: &poles }.nodes()
 }

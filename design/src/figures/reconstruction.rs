@@ -62,9 +62,14 @@ impl Reconstruction {
         self.filters().map_or(1, FilterResponse::lags)
     }
 
-    /// Angles between which F is smooth, or where it has narrow peaks.
-    pub(super) fn breaks(&self) -> Vec<f64> {
-        self.filters().map_or_else(Vec::new, FilterResponse::breaks)
+    /// The poles of recursive filters.
+    pub(super) fn poles(&self) -> &[Complex<f64>] {
+        self.filters().map_or(&[], FilterResponse::poles)
+    }
+
+    /// Angles at which F may have narrow peaks.
+    pub(super) fn resonances(&self) -> Vec<f64> {
+        self.filters().map_or_else(Vec::new, FilterResponse::resonances)
     }
 
     /// Whether an error of a delay or a gain counts: they are relative to other channels.

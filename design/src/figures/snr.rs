@@ -101,7 +101,7 @@ impl Setting {
     /// F of a way.
     pub(super) fn filters<'a>(&'a self, way: &'a Reconstruction) -> PeriodicFilters<'a> {
         let at = |theta| self.conditions.filters(way, theta, &self.conditions.signal.at(theta));
-        PeriodicFilters { at: Box::new(at), lags: way.lags(), breaks: way.breaks() }
+        PeriodicFilters { at: Box::new(at), lags: way.lags(), resonances: way.resonances() }
     }
 
     /// The ratio of the bank itself.

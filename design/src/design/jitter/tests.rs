@@ -1,5 +1,6 @@
 use super::*;
 use hybank_core::spec::Spec;
+use std::f64::consts::TAU;
 
 fn problem(filters: &str) -> Problem {
     let text = format!(
@@ -11,11 +12,10 @@ fn problem(filters: &str) -> Problem {
 #[test]
 fn jitter_is_the_slope_times_the_deviation_where_there_is_a_slope() {
     let problem = problem("{ delay = 0, filter = { family = \"butterworth\", order = 2, cutoff = 0.1 } }");
-    let covariances = Covariances::new(&problem).unwrap();
     // Var(y') / Var(y) of a Butterworth filter of order 2 is its natural frequency squared.
     let natural = (TAU * 0.1).powi(2);
     for deviation in [1e-3, 1e-4, 1e-6, 1e-9] {
-        let found = covariances.change(1, FastPeriods(deviation)) / covariances.power(1);
+        let found = problem.change(1, FastPeriods(deviation)) / problem.output_power(1);
         let expected = natural * deviation * deviation;
         assert!(
             (found / expected - 1.0).abs() < 3.0 * deviation.sqrt() + 1e-5,
@@ -25,9 +25,9 @@ fn jitter_is_the_slope_times_the_deviation_where_there_is_a_slope() {
     // One pole p has no slope: the change is that of a random walk, 2 (1 - e^{-p |d|}) on average.
     let p = TAU * 0.1;
     for deviation in [1e-2, 1e-5] {
-        let found = covariances.change(0, FastPeriods(deviation)) / covariances.power(0);
+        let found = problem.change(0, FastPeriods(deviation)) / problem.output_power(0);
         let expected = 2.0 * p * deviation * (2.0 / std::f64::consts::PI).sqrt();
         assert!((found / expected - 1.0).abs() < p * deviation + 1e-6, "{deviation}: {found} {expected}");
     }
-    assert_eq!(covariances.change(0, FastPeriods(0.0)), 0.0);
+    assert_eq!(problem.change(0, FastPeriods(0.0)), 0.0);
 }
