@@ -23,31 +23,20 @@ pub fn power_of_two(x: f64) -> f64 {
     if x > 0.0 && x.is_finite() { (x.log2() + 0.2).round().clamp(-1000.0, 1000.0).exp2() } else { 1.0 }
 }
 
-/// A balanced diagonal block.
-pub(super) struct Balanced<T> {
-    pub(super) matrix: DMatrix<T>,
-    /// The largest scale over the smallest: the condition of the change of coordinates.
-    pub(super) condition: f64,
-}
-
 /// Matrices that together have the eigenvalues of `m`: the diagonal blocks of its block triangular form,
 /// each balanced.
-pub(super) fn balanced_blocks<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> Vec<Balanced<T>> {
+pub(super) fn balanced_blocks<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> Vec<DMatrix<T>> {
     let block = |states: &Vec<usize>| {
         balanced(&DMatrix::from_fn(states.len(), states.len(), |i, j| m[(states[i], states[j])].clone()))
     };
     loops(m).iter().map(block).collect()
 }
 
-fn balanced<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> Balanced<T> {
+fn balanced<T: ComplexField<RealField = f64>>(m: &DMatrix<T>) -> DMatrix<T> {
     let scales = scales(m.map(|x| x.modulus()));
     let matrix = m.map_with_location(|i, j, x| x.scale(scales[j] / scales[i]));
     // Moduli at both ends of double precision may ask for scales beyond it.
-    if matrix.iter().any(|x| !x.clone().is_finite()) {
-        return Balanced { matrix: m.clone(), condition: 1.0 };
-    }
-    let (least, most) = scales.iter().fold((f64::INFINITY, 0.0f64), |(a, b), &x| (a.min(x), b.max(x)));
-    Balanced { matrix, condition: most / least }
+    if matrix.iter().any(|x| !x.clone().is_finite()) { m.clone() } else { matrix }
 }
 
 /// The states in groups that drive one another in a loop: the strongly connected components of the graph in

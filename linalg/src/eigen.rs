@@ -23,33 +23,12 @@ pub fn hermitian_eigenvalues<T: Scalar>(m: &DMatrix<T>) -> Result<Vec<f64>, Lina
 /// Eigenvalues of a general matrix, which is balanced first: units of the states and gains from one part to
 /// another do not matter.
 pub fn eigenvalues<T: Scalar>(m: &DMatrix<T>) -> Result<Vec<Complex<f64>>, LinalgError> {
-    balanced_eigenvalues(m).map(|(values, _)| values)
-}
-
-/// Scales that differ by more than this may reduce the accuracy: a change of coordinates magnifies errors
-/// by up to its condition, here to 2e-10. Eigenvalues that almost coincide move by the square root of that.
-const SAFE_CONDITION: f64 = 1e6;
-
-/// Candidates for the eigenvalues of a general matrix, for callers to whom a false one does no harm but a
-/// missed one does. They are those of [`eigenvalues`] and, if balancing changed scales by many decades, also
-/// those of the unbalanced matrix.
-pub fn candidate_eigenvalues<T: Scalar>(m: &DMatrix<T>) -> Result<Vec<Complex<f64>>, LinalgError> {
-    let (mut values, condition) = balanced_eigenvalues(m)?;
-    if condition > SAFE_CONDITION {
-        values.extend(T::eigenvalues(m)?);
+    check_finite("eigenvalues", m)?;
+    let mut values = Vec::with_capacity(m.nrows());
+    for block in balance::balanced_blocks(m) {
+        values.extend(T::eigenvalues(&block)?);
     }
     Ok(values)
-}
-
-/// The eigenvalues of the balanced blocks of `m`, with the condition of the worst scaling.
-fn balanced_eigenvalues<T: Scalar>(m: &DMatrix<T>) -> Result<(Vec<Complex<f64>>, f64), LinalgError> {
-    check_finite("eigenvalues", m)?;
-    let (mut values, mut condition) = (Vec::with_capacity(m.nrows()), 1.0f64);
-    for block in balance::balanced_blocks(m) {
-        values.extend(T::eigenvalues(&block.matrix)?);
-        condition = condition.max(block.condition);
-    }
-    Ok((values, condition))
 }
 
 /// Eigenvalues and eigenvectors (columns) of a general real matrix; the two of a conjugate pair are
@@ -61,33 +40,6 @@ pub fn eigen(m: &Mat) -> Result<(Vec<Complex<f64>>, CMat), LinalgError> {
     }
     let e = view(m).eigen().map_err(|_| no_convergence("eigen", m))?;
     Ok((e.S().column_vector().iter().copied().collect(), owned(e.U())))
-}
-
-/// Rotations per row after which a Schur iteration is abandoned; one or two are usual.
-const SCHUR_SWEEPS: usize = 100;
-
-/// Real Schur form `m = q t q'`: q orthogonal, t zero below its diagonal except in 2 x 2 blocks.
-///
-/// faer's Schur form is private, so this is nalgebra's, with a limit on the iterations, because it never
-/// ends on some delay lines.
-pub fn real_schur(m: &Mat) -> Result<(Mat, Mat), LinalgError> {
-    check_finite("Schur", m)?;
-    let n = m.nrows();
-    if n < 2 {
-        return Ok((Mat::identity(n, n), m.clone()));
-    }
-    let schur = nalgebra::linalg::Schur::try_new(m.clone(), f64::EPSILON, SCHUR_SWEEPS * n)
-        .ok_or_else(|| no_convergence("Schur", m))?;
-    let (q, mut t) = schur.unpack();
-    for j in 0..n {
-        for i in j + 1..n {
-            let negligible = t[(i, j)].abs() <= f64::EPSILON * (t[(j, j)].abs() + t[(i, i)].abs());
-            if i > j + 1 || negligible {
-                t[(i, j)] = 0.0;
-            }
-        }
-    }
-    Ok((q, t))
 }
 
 /// Largest modulus of the eigenvalues of a square matrix.

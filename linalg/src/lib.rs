@@ -12,8 +12,8 @@ mod solve;
 
 pub use balance::{power_of_two, state_scales};
 pub use eigen::{
-    candidate_eigenvalues, eigen, eigenvalues, hermitian_eigenvalues, largest_singular_value, real_schur,
-    singular_values, spectral_radius, svd, symmetric_eigen,
+    eigen, eigenvalues, hermitian_eigenvalues, largest_singular_value, singular_values, spectral_radius, svd,
+    symmetric_eigen,
 };
 pub use scalar::{Scalar, Svd};
 pub use solve::{PositiveFactor, cholesky, inverse, lq, lq_factor, solve, solve_lower, solve_positive};

@@ -1,7 +1,7 @@
 //! What a caller who waits for a design sees and says: the step that it is in, and its end before it is
 //! complete.
 
-use hybank_core::spec::{Method, Spec};
+use hybank_core::spec::Spec;
 use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -77,21 +77,9 @@ impl Stop {
 
 /// What makes the design of a spec shorter.
 pub fn remedy(spec: &Spec) -> &'static str {
-    match spec.design.method {
-        Method::Fir if spec.design.has_integers() => {
-            "use fewer taps, leave out bits, take a smaller ratio or fewer channels"
-        }
-        Method::Fir if spec.uncertainty.is_some() => {
-            "use fewer taps, a smaller ratio or fewer channels, or leave out [uncertainty]"
-        }
-        Method::Iir | Method::H2 if spec.design.reduction().is_some() => {
-            "use a shorter latency, leave out the order reduction, or use the method fir"
-        }
-        Method::Iir | Method::H2 => {
-            "use a shorter latency, a smaller ratio, fewer channels, or the method fir"
-        }
-        Method::Fir | Method::Sinc | Method::Separation => {
-            "use fewer taps, a smaller ratio or fewer channels"
-        }
+    if spec.is_fir() {
+        "leave out bits and [uncertainty], or use fewer taps, a smaller ratio or fewer channels"
+    } else {
+        "use a shorter latency, a smaller ratio, fewer channels, or the method fir"
     }
 }

@@ -147,7 +147,7 @@ impl FilterRealisation<'_> {
     }
 
     /// The filters in the cheapest realisation that keeps the norm `promised`: an FIR head followed by
-    /// parallel sections, an FIR head followed by a triangular state matrix, or the filters as they are.
+    /// parallel sections, an FIR head followed by a balanced recursion, or the filters as they are.
     fn fastest_realisation(&self, system: &StateSpace, promised: f64) -> Result<Realised, DesignError> {
         match self.fast_realisation(&FirWithTail::new(system)?, promised)? {
             Some(found) => Ok(found),
@@ -157,7 +157,7 @@ impl FilterRealisation<'_> {
 
     /// The first of the fast realisations that keeps the norm, if any does.
     fn fast_realisation(&self, split: &FirWithTail, promised: f64) -> Result<Option<Realised>, DesignError> {
-        let candidates = [split.parallel_form(), split.triangular_form().map(Some)];
+        let candidates = [split.parallel_form(), Ok(Some(split.clone()))];
         for candidate in candidates.into_iter().filter_map(|form| form.ok().flatten()) {
             match evaluate(self.whole, block_filters(&candidate.realise())) {
                 Ok(found) if found.peak.gain <= promised * (1.0 + REALISATION_ACCURACY) => {

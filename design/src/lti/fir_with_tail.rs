@@ -8,7 +8,7 @@
 //! y[k] = sum_{j = 0..q} h_j u[k - j] + c x[k],  x[k + 1] = a x[k] + b u[k - q].
 
 use super::gramian::{balanced, h2_norm};
-use super::parallel_form::{parallel_form, triangular_form};
+use super::parallel_form::parallel_form;
 use super::{LtiError, StateSpace};
 use hybank_linalg::Mat;
 
@@ -59,14 +59,6 @@ impl FirWithTail {
     pub(crate) fn parallel_form(&self) -> Result<Option<Self>, LtiError> {
         let tail = parallel_form(&self.tail)?;
         Ok(tail.map(|tail| Self { head: self.head.clone(), tail }))
-    }
-
-    /// The tail as a triangle, see [`triangular_form`].
-    ///
-    /// # Errors
-    /// As [`triangular_form`].
-    pub(crate) fn triangular_form(&self) -> Result<Self, LtiError> {
-        Ok(Self { head: self.head.clone(), tail: triangular_form(&self.tail)? })
     }
 
     /// q, the steps by which the input of the tail is delayed.
@@ -167,8 +159,7 @@ mod tests {
             let split = FirWithTail::new(&system).unwrap();
             assert_eq!((split.head_length(), split.tail.order()), (long, 2));
             let parallel = split.parallel_form().unwrap().unwrap();
-            let triangular = split.triangular_form().unwrap();
-            for form in [split, parallel, triangular] {
+            for form in [split, parallel] {
                 let made = form.realise();
                 assert_eq!(made.order(), 2 + 2 * long);
                 check_same(&system, &made, 1e-12);

@@ -1,5 +1,4 @@
-//! Coordinates in which a recursion needs the fewest operations: parallel sections, or else a triangular
-//! state matrix.
+//! Coordinates in which a recursion needs the fewest operations: parallel sections.
 
 use super::gramian::{controllability_root, observability_root};
 use super::{LtiError, StateSpace};
@@ -14,7 +13,7 @@ const CONDITION_LIMIT: f64 = 1e4;
 /// In each section the traces of the controllability and the observability Gramian are equal up to a power
 /// of 16. So for white input no state is much larger or smaller than its effect on the output.
 ///
-/// `None` if the eigenvectors are nearly dependent (repeated and close poles): see [`triangular_form`].
+/// `None` if the eigenvectors are nearly dependent (repeated and close poles).
 ///
 /// # Errors
 /// [`LtiError`] if the system is not stable or its eigenvectors cannot be computed.
@@ -36,16 +35,6 @@ pub(crate) fn parallel_form(system: &StateSpace) -> Result<Option<StateSpace>, L
     }
     let (b, c) = (hybank_linalg::solve(&basis, system.b()), system.c() * basis);
     sections(&modes, b, c, system.d().clone()).map(Some)
-}
-
-/// The system in a real Schur basis: `a` is zero below its diagonal except in 2 x 2 blocks. The change of
-/// coordinates is orthogonal, so it loses no accuracy for any poles.
-///
-/// # Errors
-/// [`LtiError`] if the iteration does not converge.
-pub(crate) fn triangular_form(system: &StateSpace) -> Result<StateSpace, LtiError> {
-    let (q, t) = hybank_linalg::real_schur(system.a())?;
-    Ok(StateSpace::new(t, q.transpose() * system.b(), system.c() * q, system.d().clone()))
 }
 
 /// A real pole, or the one of a conjugate pair above the real axis, with its eigenvector.
@@ -154,16 +143,6 @@ mod tests {
         all
     }
 
-    fn is_quasi_triangular(a: &Mat) -> bool {
-        let n = a.nrows();
-        let below = (0..n).all(|j| (j + 2..n).all(|i| a[(i, j)] == 0.0));
-        below && (2..n).all(|i| a[(i, i - 1)] == 0.0 || a[(i - 1, i - 2)] == 0.0)
-    }
-
-    fn stalled(n: usize) -> hybank_linalg::LinalgError {
-        hybank_linalg::LinalgError::NoConvergence { routine: "Schur", rows: n, cols: n }
-    }
-
     #[test]
     fn distinct_poles_become_sections() {
         for n in 1..14 {
@@ -201,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn repeated_poles_are_no_sections_but_a_triangle() {
+    fn repeated_poles_are_no_sections() {
         // Jordan blocks: real, nearly (a split of 1e-9), and a pair twice.
         let jordan = |n: usize, pole: f64, split: f64| {
             Mat::from_fn(n, n, |i, j| match () {
@@ -219,9 +198,6 @@ mod tests {
         ] {
             let given = system(hidden(&blocks));
             assert_eq!(parallel_form(&given).unwrap(), None, "{blocks}");
-            let made = triangular_form(&given).unwrap();
-            assert!(is_quasi_triangular(made.a()), "{}", made.a());
-            assert!(gap(&given, &made) < 1e-12, "{:e}", gap(&given, &made));
         }
     }
 
@@ -232,17 +208,12 @@ mod tests {
         assert!(is_parallel(made.a()) && gap(&given, &made) < 1e-14);
     }
 
-    /// A single delay is a section. The eigenvectors of a longer delay line are all the same one, and the
-    /// QR iteration may stall on it (3 states do): an error then, never a wrong triangle.
+    /// A single delay is a section. The eigenvectors of a longer delay line are all the same one.
     #[test]
-    fn delay_lines_are_triangles_or_an_error() {
+    fn delay_lines_are_no_sections() {
         for n in 1..18 {
             let given = system(Mat::from_fn(n, n, |i, j| f64::from(u8::from(i == j + 1))));
             assert_eq!(parallel_form(&given).unwrap().is_some(), n == 1, "{n}");
-            match triangular_form(&given) {
-                Ok(made) => assert!(is_quasi_triangular(made.a()) && gap(&given, &made) < 1e-12, "{n}"),
-                Err(error) => assert_eq!(error, LtiError::Linalg(stalled(n))),
-            }
         }
     }
 
@@ -250,6 +221,5 @@ mod tests {
     fn no_state_is_no_trouble() {
         let empty = StateSpace::new(Mat::zeros(0, 0), Mat::zeros(0, 2), Mat::zeros(3, 0), Mat::zeros(3, 2));
         assert_eq!(parallel_form(&empty).unwrap(), Some(empty.clone()));
-        assert_eq!(triangular_form(&empty).unwrap(), empty);
     }
 }

@@ -56,13 +56,15 @@ pub(crate) fn hinf_norm_with_response(
     PeakSearch::new(&system.compress_inputs(), 0, response, initial).run()
 }
 
-/// The peaks of a stable system above `level`: at least one in each frequency interval in which the gain
-/// exceeds it.
-pub(crate) fn peaks_above(system: &StateSpace, level: f64) -> Result<Vec<Peak>, LtiError> {
+/// The local maxima of the gain of a stable system that a grid shows, refined.
+pub(crate) fn local_peaks(system: &StateSpace) -> Result<Vec<Peak>, LtiError> {
     let poles = stable_poles(system)?;
     let system = system.compress_inputs();
     let response = FrequencyResponse::new(&system);
-    PeakSearch::new(&system, 0, &|w| response.at_frequency(w), resonances(&poles)).all_above(level)
+    let at = |w| response.at_frequency(w);
+    let search = PeakSearch::new(&system, 0, &at, resonances(&poles));
+    let refined = |around| refine(|w| search.at(w), around, SETTINGS.flat_gain);
+    local_maxima(&search.grid()?).into_iter().map(refined).collect()
 }
 
 /// The poles of a stable system.
@@ -175,7 +177,7 @@ impl<'a> PeakSearch<'a> {
 
     /// A frequency with a gain above `level`, refined, if there is one.
     fn above(&self, level: f64) -> Result<Option<Peak>, LtiError> {
-        let crossings = self.crossings(level, SETTINGS.near_axis)?;
+        let crossings = self.crossings(level)?;
         let mut candidates = crossings.clone();
         candidates.extend(crossings.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])));
         let mut best = Peak { gain: level, frequency: f64::NAN };
@@ -190,42 +192,22 @@ impl<'a> PeakSearch<'a> {
         refine(|w| self.at(w), [low, best, high], SETTINGS.flat_gain).map(Some)
     }
 
-    fn all_above(&self, level: f64) -> Result<Vec<Peak>, LtiError> {
-        let mut edges = self.crossings(level, SETTINGS.on_axis)?;
-        edges.dedup();
-        let mut peaks = Vec::new();
-        for range in edges.windows(2) {
-            let start = self.at(0.5 * (range[0] + range[1]))?;
-            if start.gain > level {
-                let (low, high) = (self.at(range[0])?, self.at(range[1])?);
-                let inside = refine(|w| self.at(w), [low, start, high], SETTINGS.flat_gain)?;
-                peaks.push(higher(inside, higher(low, high)));
-            }
-        }
-        Ok(peaks)
-    }
-
-    /// Frequencies in [0, pi], ascending and with both ends, at which the gain may equal `level`: those of
-    /// eigenvalues that lie off the axis by at most `tolerance` (relative).
-    ///
-    /// The eigenvalues are computed for the balanced Hamiltonian matrix. If its scales differ by many
-    /// decades, they are also computed for the unbalanced one. Large gains need balancing; balancing may
-    /// amplify the smallest entries, which are rounding errors.
+    /// Frequencies in [0, pi], ascending and with both ends, at which the gain may equal `level`.
     ///
     /// If measurements are copies of one another, there is no Hamiltonian matrix. Then no frequency is
     /// suggested, and the result is that of the refined grid, which is still an attained value.
-    fn crossings(&self, level: f64, tolerance: f64) -> Result<Vec<f64>, LtiError> {
+    fn crossings(&self, level: f64) -> Result<Vec<f64>, LtiError> {
         let mut crossings = vec![0.0, PI];
         let centre = self.centre(level)?;
         let real = centre == 0.0 || centre == PI;
         let eigenvalues = if real {
             let turn = if centre == PI { 1.0 } else { -1.0 };
             let matrix = hamiltonian_about(turn, &self.system, self.measurements, level);
-            hybank_linalg::candidate_eigenvalues(&matrix)
+            hybank_linalg::eigenvalues(&matrix)
         } else {
             let turn = -Complex::from_polar(1.0, -centre);
             let matrix = hamiltonian_about(turn, &self.system, self.measurements, level);
-            hybank_linalg::candidate_eigenvalues(&matrix)
+            hybank_linalg::eigenvalues(&matrix)
         };
         let eigenvalues = match eigenvalues {
             Err(hybank_linalg::LinalgError::NotFinite { .. }) if self.measurements > 0 => {
@@ -235,7 +217,7 @@ impl<'a> PeakSearch<'a> {
         };
         // Of a conjugate pair one is enough.
         for lambda in eigenvalues.into_iter().filter(|lambda| !real || lambda.im >= 0.0) {
-            if lambda.re.abs() <= tolerance * (1.0 + lambda.norm()) {
+            if lambda.re.abs() <= SETTINGS.near_axis * (1.0 + lambda.norm()) {
                 let w = centre + PI + 2.0 * lambda.im.atan();
                 crossings.push(Peak { gain: level, frequency: w }.folded().frequency);
             }

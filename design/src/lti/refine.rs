@@ -9,13 +9,10 @@ pub(super) struct Settings {
     pub(super) accuracy: f64,
     /// Frequencies closer than this count as equal: at a smooth peak their gains agree to all digits.
     pub(super) same_frequency: f64,
-    /// How far off the axis (relative) an eigenvalue may lie and still count as a crossing: the roundings
-    /// of ordinary ones.
-    pub(super) on_axis: f64,
-    /// As [`Self::on_axis`], for frequencies that are only suggested. If the level almost touches a peak,
-    /// two eigenvalues meet on the axis, and a rounding error of the matrix moves them by its square root.
-    /// Errors of 1e-4 are common if the gain is small relative to terms that cancel. A false suggestion
-    /// costs one evaluation; a missed one loses a peak.
+    /// How far off the axis (relative) an eigenvalue may lie and still suggest a frequency. If the level
+    /// almost touches a peak, two eigenvalues meet on the axis, and a rounding error of the matrix moves
+    /// them by its square root. Errors of 1e-4 are common if the gain is small relative to terms that
+    /// cancel. A false suggestion costs one evaluation; a missed one loses a peak.
     pub(super) near_axis: f64,
     /// A frequency whose gain is this close to the level (relative) is a bad centre of the Cayley
     /// transform.
@@ -40,7 +37,6 @@ pub(super) struct Settings {
 pub(super) const SETTINGS: Settings = Settings {
     accuracy: 1e-9,
     same_frequency: 1e-9,
-    on_axis: 1e-5,
     near_axis: 1e-2,
     near_level: 1e-2,
     resonant_radius: 0.5,

@@ -82,14 +82,15 @@ fn verify(f: &Mat, g: &Mat, h: &Mat, x: Mat) -> Option<RiccatiSolution> {
 /// A few steps of the plain recursion, which contracts about its stabilising solution, as long as they help.
 /// Returns the solution and its residual.
 fn refined(f: &Mat, g: &Mat, h: &Mat, x: Mat) -> (Mat, f64) {
-    let step = |weight: Mat| hybank_linalg::symmetric_part(&(f.transpose() * weight * f + h));
+    let step = |x: &Mat| {
+        let weight = x * hybank_linalg::inverse(&identity_plus(g, x));
+        hybank_linalg::symmetric_part(&(f.transpose() * weight * f + h))
+    };
     let gap = |a: &Mat, b: &Mat| Some((a - b).norm()).filter(|gap| gap.is_finite()).unwrap_or(f64::INFINITY);
-    let (plain, inverse) = (step(plain_weight(g, &x)), step(inverse_weight(g, &x)));
-    let by_inverse = gap(&inverse, &x) < gap(&plain, &x);
-    let (mut best, mut next) = (x, if by_inverse { inverse } else { plain });
+    let (mut best, mut next) = (x.clone(), step(&x));
     let mut residual = gap(&next, &best);
     for _ in 0..REFINEMENT_LIMIT {
-        let after = step(if by_inverse { inverse_weight(g, &next) } else { plain_weight(g, &next) });
+        let after = step(&next);
         let change = gap(&after, &next);
         if change >= residual {
             break;
@@ -97,16 +98,6 @@ fn refined(f: &Mat, g: &Mat, h: &Mat, x: Mat) -> (Mat, f64) {
         (best, next, residual) = (next, after, change);
     }
     (best, residual)
-}
-
-/// X (I + G X)^-1.
-fn plain_weight(g: &Mat, x: &Mat) -> Mat {
-    x * hybank_linalg::inverse(&identity_plus(g, x))
-}
-
-/// (X^-1 + G)^-1, the same for an invertible X. It loses no digits where X is almost infinite.
-fn inverse_weight(g: &Mat, x: &Mat) -> Mat {
-    hybank_linalg::inverse(&(hybank_linalg::inverse(x) + g))
 }
 
 /// The stabilising solution P (n x n) of the Riccati equation of the bounded real lemma (Green and Limebeer,

@@ -37,7 +37,7 @@ pub(super) fn proven_gain(bank: &Bank, frequency: f64) -> Result<Option<f64>, De
 /// the search.
 pub(crate) fn prove(bank: &Bank, stated: &Gamma, stop: &Stop) -> Result<(Proof, Verified), DesignError> {
     let error = EnclosedErrorSystem::new(bank)?;
-    let upper = certificate(&error, bank, stop)?;
+    let upper = certificate(&error, stop)?;
     let verified = error.judge(stated, &upper, Strictness::NotRefuted)?;
     Ok((Proof { upper, worst_case: None }, verified))
 }

@@ -12,7 +12,7 @@ use crate::design::limits::{MAX_LONG_STATES, Stop};
 use crate::lti::gramian::{controllability_root, observability_root};
 use crate::lti::peak::hinf_norm;
 use crate::lti::{GramianCoordinates, LtiError, StateSpace, bounded_real_riccati};
-use hybank_core::bank::{Bank, Certificate, GainWitness};
+use hybank_core::bank::{Certificate, GainWitness};
 use hybank_linalg::{Complex, Mat, power_of_two};
 use hybank_verify::arithmetic::dense::{cholesky, product, riccati_limit, select, solve, symmetric};
 use hybank_verify::arithmetic::{BigFloat, Float, Float512};
@@ -29,9 +29,6 @@ struct Settings {
     /// excess (and of the number of states). With it no direction is unobservable. The noise would raise
     /// the norm by only a hundredth of the excess.
     state_noise: f64,
-    /// Relative excess of a stated norm over the one computed here that counts as rounding: the norm is a
-    /// peak of differences.
-    same_norm: f64,
     /// Relative distance of the enclosed gain at the peak from the norm above which double precision does
     /// not resolve the norm.
     resolved_norm_gap: f64,
@@ -39,7 +36,7 @@ struct Settings {
 
 /// Of every search.
 const SETTINGS: Settings =
-    Settings { noise_share_of_excess: 1e-3, state_noise: 0.1, same_norm: 1e-6, resolved_norm_gap: 1e-7 };
+    Settings { noise_share_of_excess: 1e-3, state_noise: 0.1, resolved_norm_gap: 1e-7 };
 
 /// Relative excesses over the computed norm at which the search tries to find a certificate, smallest
 /// first.
@@ -64,11 +61,7 @@ const CORRECTION_DIGITS: [usize; 2] = [9, 17];
 const MAX_SEARCHED_STATES: usize = 512;
 
 /// The certificate with the least gamma, of those tried until `stop` is due, that passes.
-pub(super) fn certificate(
-    error: &EnclosedErrorSystem<'_>,
-    bank: &Bank,
-    stop: &Stop,
-) -> Result<Certificate, DesignError> {
+pub(super) fn certificate(error: &EnclosedErrorSystem<'_>, stop: &Stop) -> Result<Certificate, DesignError> {
     if error.states() > MAX_SEARCHED_STATES {
         return Err(DesignError::NotSearched { states: error.states(), limit: MAX_SEARCHED_STATES });
     }
@@ -80,11 +73,7 @@ pub(super) fn certificate(
     let peak = hinf_norm(&system)?;
     let response = system.response_at(Complex::from_polar(1.0, peak.frequency));
     let mut peak_witness = witness(peak.frequency, &leading_direction(&response)?);
-    // The norm in the file may differ from the one computed here in the last digits; if the difference is
-    // larger, the stated number is not the norm.
-    let stated = bank.gamma.norm.map(|stated| stated / units.reference);
-    let credible = stated.filter(|&stated| stated <= peak.gain * (1.0 + SETTINGS.same_norm));
-    let mut norm = credible.unwrap_or(0.0).max(peak.gain);
+    let mut norm = peak.gain;
     let floor = ZERO_NORM * error.scale() / units.reference;
     let shown = error.attains(&peak_witness).unwrap_or(0.0) / units.reference;
     if norm > floor

@@ -9,7 +9,7 @@ use crate::design::exchange::Exchange;
 use crate::design::limits::Stop;
 use crate::design::plant::LiftedPlant;
 use crate::lmi::sampled::{self, FrequencyPoint, MeanSquareObjective};
-use crate::lti::peak::{peaks_above, resonances, stable_poles};
+use crate::lti::peak::{local_peaks, resonances, stable_poles};
 use crate::lti::{FirMatrix, FrequencyResponse, StateSpace};
 use std::f64::consts::PI;
 
@@ -89,9 +89,9 @@ impl AffineError for OutputError<'_> {
         driving(&self.regressors, self.plant.at(location.frequency))
     }
 
-    fn peaks(&self, taps: &FirMatrix, level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
+    fn peaks(&self, taps: &FirMatrix, _level: f64) -> Result<Vec<LocatedPeak<()>>, DesignError> {
         let error = self.plant.error_system(&self.recursion.with_outputs(&taps.lags()[0]));
-        Ok(peaks_above(&error, level)?.into_iter().map(LocatedPeak::from).collect())
+        Ok(local_peaks(&error)?.into_iter().map(LocatedPeak::from).collect())
     }
 }
 
