@@ -355,7 +355,8 @@ impl Innovations {
     /// From gains on yw to gains on the channels, zero for those left out.
     fn on_channels(&self, gains: &Mat) -> Mat {
         let known = self.direct.len();
-        let direct = unwhiten(&self.root, &gains.columns(0, known).into_owned());
+        let whitened = gains.columns(0, known).transpose();
+        let direct = hybank_linalg::solve(&self.root.transpose(), &whitened).transpose();
         let mut all = Mat::zeros(gains.nrows(), self.channels);
         for (i, &channel) in self.direct.iter().enumerate() {
             all.set_column(channel, &direct.column(i));
@@ -383,15 +384,6 @@ fn chain_variances(delayed: &[DelayedChannel], n: usize) -> Mat {
         }
     }
     p0
-}
-
-/// m root^-1 for a lower triangular root.
-fn unwhiten(root: &Mat, m: &Mat) -> Mat {
-    let n = root.nrows();
-    let flipped = |m: &Mat| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(m.nrows() - 1 - i, j)]);
-    // root' x = m' is upper triangular: reverse the order of rows and columns to use the lower solver.
-    let upper = Mat::from_fn(n, n, |i, j| root[(n - 1 - j, n - 1 - i)]);
-    flipped(&hybank_linalg::solve_lower(&upper, &flipped(&m.transpose()))).transpose()
 }
 
 /// The feedthrough of each channel, given the channels before it, relative to the channel's size. Channels

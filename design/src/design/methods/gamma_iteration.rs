@@ -191,37 +191,23 @@ impl<'a> GammaIteration<'a> {
 
     /// Halves the bracket until it is narrow. A gamma that is not resolved counts as too small.
     pub(super) fn bisect(&mut self) -> Result<(), DesignError> {
-        let (mut floor, mut ceiling) = (self.floor(), self.ceiling()?);
+        let mut floor = self.lower.max(self.negligible);
+        let mut ceiling = self.upper();
+        if ceiling.is_infinite() {
+            ceiling = self.zero_output_norm()?;
+        }
         for _ in 0..TRIAL_LIMIT {
             if self.done() || ceiling <= floor * (1.0 + SETTINGS.bracket_share * GAMMA_ACCURACY) {
                 break;
             }
             let gamma = (floor * ceiling).sqrt();
-            match self.attempt_or_exclude(gamma)? {
+            match self.attempt(gamma)? {
                 Trial::Achieved(_) => ceiling = gamma.min(self.upper()),
-                Trial::Impossible | Trial::Unresolved => floor = gamma,
+                Trial::Impossible => (floor, self.lower) = (gamma, gamma),
+                Trial::Unresolved => floor = gamma,
             }
         }
         Ok(())
-    }
-
-    /// As [`GammaIteration::attempt`]; a gamma that no filter achieves raises the lower bound.
-    fn attempt_or_exclude(&mut self, gamma: f64) -> Result<Trial, DesignError> {
-        let trial = self.attempt(gamma)?;
-        if matches!(trial, Trial::Impossible) {
-            self.lower = self.lower.max(gamma);
-        }
-        Ok(trial)
-    }
-
-    /// The least gamma to try.
-    fn floor(&self) -> f64 {
-        self.lower.max(self.negligible)
-    }
-
-    /// A gamma that some filter achieves.
-    fn ceiling(&self) -> Result<f64, DesignError> {
-        if self.upper().is_finite() { Ok(self.upper()) } else { self.zero_output_norm() }
     }
 
     /// ||W||, the gamma of the bank that outputs zeros.
