@@ -172,25 +172,13 @@ impl<'a> TapQuantiser<'a> {
     /// The most fraction bits, within their limits, with which each rounded tap fits its bits. Taps that are
     /// zero at every scale, because of their bits, do not count.
     pub(super) fn finest_that_fits(&self, bits: &WordLengths) -> i32 {
-        let taps = self.error.problem.taps;
-        let spans = taps.iter().flat_map(|filter| {
-            filter
-                .iter()
-                .enumerate()
-                .map(|(n, &tap)| (tap, IntegerSpan::of(bits, n)))
-                .filter(|(tap, span)| span.reaches(*tap))
-        });
-        let nonzero: Vec<(f64, IntegerSpan)> = spans.collect();
-        let fits = |scale: i32| {
-            let factor = f64::from(scale).exp2();
-            nonzero.iter().all(|(tap, span)| span.contains((tap * factor).round_ties_even()))
+        let finest = |(n, &tap): (usize, &f64)| {
+            let span = IntegerSpan::of(bits, n);
+            let fits = |scale: &i32| span.contains((tap * f64::from(*scale).exp2()).round_ties_even());
+            let found = || (-MAX_FRACTION_BITS..=MAX_FRACTION_BITS).rev().find(fits);
+            span.reaches(tap).then(|| found().unwrap_or(-MAX_FRACTION_BITS))
         };
-        let widest = (0..taps[0].len()).map(|n| bits.bits(n)).max().unwrap_or(0) as i32;
-        let most = nonzero.iter().fold(0.0f64, |most, (tap, _)| most.max(tap.abs()));
-        let magnitude = if most == 0.0 { 0 } else { most.log2().floor() as i32 };
-        let within = |scale: i32| scale.clamp(-MAX_FRACTION_BITS, MAX_FRACTION_BITS);
-        // At the coarsest of these scales all taps are below one half, so they fit.
-        let (coarsest, finest) = (within(-2 - magnitude), within(widest - 1 - magnitude));
-        (coarsest..=finest).rev().find(|&scale| fits(scale)).unwrap_or(coarsest)
+        let taps = self.error.problem.taps.iter();
+        taps.flat_map(|filter| filter.iter().enumerate().filter_map(finest)).min().unwrap_or(0)
     }
 }
