@@ -63,14 +63,15 @@ def signal(kind, seconds, seed, top):
 
 
 class Recorder:
-    def __init__(self, rate, start, ppm=0.0, gain=1.0, noise=3e-5, bend=0.0, lost=None):
+    def __init__(self, rate, start, ppm=0.0, gain=1.0, noise=3e-5, bend=0.0, jump=0.0, lost=None):
         self.rate, self.start, self.ppm, self.gain = rate, start, ppm, gain
-        self.noise, self.bend, self.lost = noise, bend, lost
+        self.noise, self.bend, self.jump, self.lost = noise, bend, jump, lost
 
     def times(self, seconds):
-        """When it samples; with a bend its drift turns round half-way."""
+        """When it samples; half-way its drift turns round with a bend, and falls by a jump."""
         t = np.arange(int(seconds * self.rate)) / self.rate
         t = self.start + t / (1 + 1e-6 * self.ppm) + 1e-6 * self.bend * t * (1 - t / seconds)
+        t += 1e-6 * self.jump * np.maximum(0, t - self.start - seconds / 2)
         return t if self.lost is None else np.delete(t, slice(*self.lost))
 
     def record(self, x, seconds, rng):
@@ -95,6 +96,7 @@ SCENES = {
         [Recorder(24_000, 0.5), Recorder(24_000, 0.7, 12, 0.9), Recorder(24_000, 0.1, -31, -1.1)], 72_000,
     ),
     "drift turns round": ("music", 18e3, [Recorder(24_000, 0.5), Recorder(24_000, 0.9, 0, 0.7, bend=40)], 48_000),
+    "rate jumps": ("music", 18e3, [Recorder(24_000, 0.5), Recorder(24_000, 0.9, 20, 0.7, jump=30)], 48_000),
     "quiet recorder": ("speech", 10e3, [Recorder(24_000, 0.5), Recorder(24_000, 0.9, 25, 0.05)], 24_000),
 }
 

@@ -26,14 +26,17 @@ fn ask() -> bool {
     request.is_some_and(|ask| ask())
 }
 
-/// From now on interrupts are handled, and a write beyond the limit of the file size (`ulimit -f`) fails as
+/// From here on interrupts are handled, and a write beyond the limit of the file size (`ulimit -f`) fails as
 /// one to a full disk does. A program calls it once, at the beginning of its `main`. Where no thread can be
 /// started, signals keep their default effect.
 #[cfg(unix)]
 pub fn handle() {
     // The handler only has to exist: by default this signal ends the process.
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, std::sync::Arc::default());
-    let _ = std::thread::Builder::new().name("interrupts".into()).spawn(each_interrupt);
+    let (registered, all) = std::sync::mpsc::channel();
+    let _ = std::thread::Builder::new().name("interrupts".into()).spawn(|| each_interrupt(registered));
+    // A signal that comes while its handler is put in place may be lost. The sender only goes.
+    let _ = all.recv();
 }
 
 /// Nothing, on a system without signals.
@@ -41,11 +44,12 @@ pub fn handle() {
 pub fn handle() {}
 
 #[cfg(unix)]
-fn each_interrupt() {
+fn each_interrupt(registered: std::sync::mpsc::Sender<()>) {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM};
     let caught = [SIGINT, SIGTERM, SIGQUIT, SIGHUP].into_iter();
     let caught = caught.filter(|&signal| signal != SIGHUP || !outlives_terminal());
     let Ok(mut signals) = signal_hook::iterator::Signals::new(caught) else { return };
+    drop(registered);
     let mut is_asked = false;
     for signal in signals.forever() {
         // A lost terminal may be reported twice, by the system and by the shell.

@@ -62,7 +62,7 @@ pub struct ClockCourse {
 impl ClockCourse {
     /// Of the reference itself.
     pub(super) fn reference() -> Self {
-        Self { smooth: None, bend: Bend::default(), steps: Vec::new(), readings: Vec::new() }
+        Self { smooth: None, bend: Bend::none(), steps: Vec::new(), readings: Vec::new() }
     }
 
     /// Through readings of a recording with these steps. `None` if no spline goes through them, and with
@@ -222,6 +222,18 @@ mod tests {
         }
         let straight = ClockCourse::new(readings(200, 20, 1e-6, |k| 3e-6 * k), Vec::new()).unwrap();
         assert_eq!(straight.bend.at(3000.0), 0.0);
+    }
+
+    /// A rate that jumps between two readings: none beside the jump is refused.
+    #[test]
+    fn a_rate_that_jumps_is_followed_around_its_jump() {
+        let lag = |k: f64| 10.0 + 2e-5 * k.min(1567.0) - 1e-5 * (k - 1567.0).max(0.0);
+        let course = ClockCourse::new(readings(200, 20, 1e-6, lag), Vec::new()).unwrap();
+        assert!((0..200).all(|piece| course.reading(piece).is_some()));
+        for k in [0.0, 1540.0, 1560.0, 1567.0, 1574.0, 1590.0, 3980.0] {
+            let miss = course.at(k) - k + lag(k);
+            assert!(miss.abs() < 1e-6, "{k}: {miss:e}");
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The steps from a spec to a finished bank.
 
+use super::band_error::BandError;
 use super::limits::{Stage, Stop, TIME_LIMIT, remedy};
 use super::methods::robust_fir::RobustStudy;
 use super::methods::{self, MethodSettings, Synthesis};
@@ -12,7 +13,7 @@ use super::reduction::OrderReduction;
 use super::sizing::Sizing;
 use super::{DesignError, filters, prove};
 use hybank_core::bank::{Bank, Gamma, SynthesisFilters};
-use hybank_core::spec::{At, DesignSpec, Method, Spec, SpecProblem};
+use hybank_core::spec::{At, DesignSpec, Method, SignalSpec, Spec, SpecProblem};
 use hybank_core::units::RadiansPerSlowPeriod;
 use hybank_verify::analog::SignalFilter;
 use hybank_verify::verify::Verified;
@@ -106,26 +107,53 @@ impl DesignOptions<'_> {
 /// [`Design::proof`].
 pub fn design(spec: &Spec, options: &DesignOptions<'_>) -> Result<Design, DesignError> {
     spec.check()?;
-    designed(&filled_in(spec), options).map_err(|error| match error {
+    let stop = options.stop.within(options.time_limit);
+    let judged = for_signal(spec, options, &stop).map_err(|error| match error {
         DesignError::Stopped => DesignError::StoppedWithoutBank { remedy: remedy(spec) },
         other => other,
-    })
+    })?;
+    if stop.is_due() {
+        return Ok(Design { proof: Err(DesignError::Stopped), ..judged });
+    }
+    if options.proof == ProofSearch::Run {
+        (options.observer)(Stage::Proof);
+    }
+    Ok(judged.proved(options.proof, &stop))
+}
+
+/// The bank for the usual W of its signal; or that for a sharp one, where the band limits the first bank and
+/// the second has a better SNR.
+fn for_signal(spec: &Spec, options: &DesignOptions<'_>, stop: &Stop) -> Result<Design, DesignError> {
+    let usual = designed(&filled_in(spec), options, stop)?;
+    let is_driven = matches!(spec.design.method, Method::Fir | Method::Iir);
+    let Some(floor) = SignalFilter::sharp_floor(spec).filter(|_| is_driven) else { return Ok(usual) };
+    let Some(error) = BandError::of(&usual.bank)?.filter(BandError::is_of_signal) else { return Ok(usual) };
+    // A design that fails or does not end in time is no better.
+    let Ok(sharp) = designed(&with_floor(spec, floor), options, stop) else { return Ok(usual) };
+    let is_better = BandError::of(&sharp.bank)?.is_some_and(|other| other.total() < error.total());
+    Ok(if is_better { sharp } else { usual })
 }
 
 /// The spec with the floor of its signal, if that follows from the noise of the converters.
 fn filled_in(spec: &Spec) -> Spec {
-    let mut filled = spec.clone();
-    if let Some((signal, filter)) = filled.signal.as_mut().zip(SignalFilter::of(spec)) {
-        signal.floor_db = signal.floor_db.or(filter.floor_db);
-    }
-    filled
+    let floor = SignalFilter::of(spec).and_then(|filter| filter.floor_db);
+    floor.map_or_else(|| spec.clone(), |floor| with_floor(spec, floor))
 }
 
-fn designed(spec: &Spec, options: &DesignOptions<'_>) -> Result<Design, DesignError> {
-    let stop = options.stop.within(options.time_limit);
+/// The spec with a floor of its signal, unless it states one.
+fn with_floor(spec: &Spec, floor: f64) -> Spec {
+    let signal = spec.signal.clone().map(|signal| {
+        let floor_db = signal.floor_db.or(Some(floor));
+        SignalSpec { floor_db, ..signal }
+    });
+    Spec { signal, ..spec.clone() }
+}
+
+/// The bank of a spec without its proof.
+fn designed(spec: &Spec, options: &DesignOptions<'_>, stop: &Stop) -> Result<Design, DesignError> {
     let problem = Problem::before_sizing(spec)?;
     let observer = |designs| (options.observer)(Stage::Latency { designs });
-    let sizing = Sizing::new(spec, &problem, SizingControl { observer: &observer, stop: &stop })?;
+    let sizing = Sizing::new(spec, &problem, SizingControl { observer: &observer, stop })?;
     let problem = Problem { latency: sizing.latency, ..problem };
     (options.observer)(Stage::Filters);
     let settings = MethodSettings { stop: stop.clone(), ..settings(spec, sizing.taps)? };
@@ -134,15 +162,8 @@ fn designed(spec: &Spec, options: &DesignOptions<'_>) -> Result<Design, DesignEr
     let plant = LiftedPlant::new(&merged.problem);
     let synthesis = methods::synthesise(spec.design.method, &plant, &settings)?;
     (options.observer)(Stage::Realisation);
-    let realised = realise(spec, &problem, &merged, &plant, &synthesis, &stop)?;
-    let judged = judge(spec, sizing, realised, &synthesis).without_unresolved_bounds(&problem);
-    if stop.is_due() {
-        return Ok(Design { proof: Err(DesignError::Stopped), ..judged });
-    }
-    if options.proof == ProofSearch::Run {
-        (options.observer)(Stage::Proof);
-    }
-    Ok(judged.proved(options.proof, &stop))
+    let realised = realise(spec, &problem, &merged, &plant, &synthesis, stop)?;
+    Ok(judge(spec, sizing, realised, &synthesis).without_unresolved_bounds(&problem))
 }
 
 /// Judges FIR filters that were designed elsewhere, `taps[i][n]` = `f_i[n]`, with the front ends, the delays

@@ -2,6 +2,7 @@
 //! system ([`LiftedPlant`]); an IIR, H2 or FIR method finds the filters; a certificate proves their error.
 
 pub mod analysis;
+mod band_error;
 mod causal_errors;
 mod designer;
 mod deviations;

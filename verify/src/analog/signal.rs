@@ -3,7 +3,8 @@
 //! A band becomes an elliptic filter: flat within 1 dB over the band, and `floor_db` down from the stop edge
 //! on. The stop edge lies where the samples cannot tell frequencies apart any more, at most 35 % above the
 //! band. This rule was chosen among 44 filters on twelve systems; Butterworth and Chebyshev 2 filters, less
-//! ripple and a stop edge at the mirror frequency lost up to 75 dB of SNR.
+//! ripple and a stop edge at the mirror frequency lost up to 75 dB of SNR. A floor beyond the usual ones has
+//! its stop edge nearer and more poles: it is worth these where the band is what limits a bank.
 
 use super::families::Selectivity;
 use super::{AnalogError, StableFilter};
@@ -16,6 +17,10 @@ struct Settings {
     ripple_db: f64,
     /// The stop edge of a low-pass W over the end of the band, where the samples resolve so much.
     stop_edge: f64,
+    /// The same with a floor beyond [`FLOORS_DB`].
+    sharp_edge: f64,
+    /// The floor of a sharp W.
+    sharp_floor_db: f64,
     /// Distance of the stop edges of a band-pass W from the band, over its width: half of that of a
     /// low-pass on each side.
     skirt: f64,
@@ -32,6 +37,8 @@ struct Settings {
 const SETTINGS: Settings = Settings {
     ripple_db: 1.0,
     stop_edge: 1.35,
+    sharp_edge: 1.1,
+    sharp_floor_db: 120.0,
     skirt: 0.175,
     bits_of_least_floor: 8.0,
     floor_per_bit_db: 10.0,
@@ -41,6 +48,7 @@ const SETTINGS: Settings = Settings {
 /// Most poles of a low-pass W, and of the prototype of a band-pass W. A sharper filter has more states than
 /// its floor is worth.
 const MOST_POLES: usize = 12;
+const MOST_SHARP_POLES: usize = 14;
 const MOST_PROTOTYPE_POLES: usize = 8;
 /// Floors by the noise of the converters: 10 dB per bit from 8 bits on, and never outside these.
 const FLOORS_DB: [f64; 2] = [40.0, 80.0];
@@ -74,6 +82,14 @@ impl SignalFilter {
         signal.band().map(|_| signal.floor_db.unwrap_or_else(|| usual_floor(spec)))
     }
 
+    /// The floor of the sharp W of `spec`; `None` where the spec states its own or has no band, and where
+    /// the samples leave no room for one beyond the usual floors.
+    pub fn sharp_floor(spec: &Spec) -> Option<f64> {
+        let signal = spec.signal.as_ref().filter(|signal| signal.floor_db.is_none())?;
+        let sharp = Self::of_band(signal.band()?, resolved_band(spec), SETTINGS.sharp_floor_db);
+        sharp.floor_db.filter(|floor| *floor > FLOORS_DB[1])
+    }
+
     /// The signal of `spec` with W in place of the band, so that it no longer depends on the rates of the
     /// spec.
     pub fn written_out(spec: &Spec) -> Option<SignalSpec> {
@@ -89,7 +105,12 @@ impl SignalFilter {
             (order, floor_db.min(shape.attenuation_of(order)))
         };
         let (order, floor_db) = if band.is_low_pass() {
-            sharpest(low_pass_transitions(band, resolved), |transition| elliptic(transition, MOST_POLES))
+            let is_sharp = floor_db > FLOORS_DB[1];
+            let (edge, most) = match is_sharp {
+                true => (SETTINGS.sharp_edge, MOST_SHARP_POLES),
+                false => (SETTINGS.stop_edge, MOST_POLES),
+            };
+            sharpest(low_pass_transitions(band, resolved, edge), |transition| elliptic(transition, most))
         } else {
             let transitions = band_pass_transitions(band, resolved);
             sharpest(transitions, |transition| elliptic(transition, MOST_PROTOTYPE_POLES))
@@ -129,8 +150,8 @@ fn usual_floor(spec: &Spec) -> f64 {
 }
 
 /// The stop edge over the end of the band: the wanted one, and the one for a band that leaves no room.
-fn low_pass_transitions(band: Band, resolved: Hertz) -> [f64; 2] {
-    [SETTINGS.stop_edge.min(resolved / band.high), SETTINGS.stop_edge]
+fn low_pass_transitions(band: Band, resolved: Hertz, edge: f64) -> [f64; 2] {
+    [edge.min(resolved / band.high), edge]
 }
 
 /// The frequency of the prototype to which the nearer stop edge belongs: clipped to the zone in which the
@@ -196,6 +217,10 @@ mod tests {
         for (edge, resolved, order) in orders {
             assert_eq!(written([0.0, edge], resolved, 80.0), (order, 80.0), "{edge} of {resolved}");
         }
+        // ellipord(1, 1.1, 1, 120, analog=True) is 15, one more than the most; 105 dB take 13.
+        let (order, floor) = written([0.0, 0.1], 0.5, 120.0);
+        assert!(order == 14 && (110.0..120.0).contains(&floor), "{order} {floor}");
+        assert_eq!(written([0.0, 0.1], 0.5, 105.0), (13, 105.0));
     }
 
     /// The floor holds from the stop edge on, and the ripple up to the band's end.

@@ -88,3 +88,25 @@ fn a_band_is_designed_for() {
     assert_eq!(floor, Some(Some(80.0)));
     assert!(norm < 1e-3 * gamma("").0, "{norm}");
 }
+
+/// Where the band limits a bank, a sharp W is better, if the noise does not limit it before; a floor that is
+/// stated stays.
+#[test]
+fn a_band_that_limits_a_bank_has_a_sharp_filter() {
+    let floor = |more: &str, bits: &str, method: &str| {
+        let front = "{ family = \"butterworth\", order = 2, cutoff = 0.4167 }";
+        let text = format!(
+            "fast_rate = 1.0\nratio = 2\nlatency = 24\ntarget = {{ filter = {front} }}\n\
+             signal = {{ band = 0.4167{more} }}\n\
+             channel = [{{ delay = 1.2{bits} }}, {{ delay = 0.6{bits} }}]\ndesign = {{ {method} }}"
+        );
+        let bank = designed(&Spec::from_toml(&text, "spec.toml").unwrap()).bank;
+        bank.spec.and_then(|spec| spec.signal?.floor_db).unwrap()
+    };
+    let fir = "method = \"fir\", taps = 48";
+    assert!((110.0..120.0).contains(&floor("", "", fir)));
+    assert!((110.0..120.0).contains(&floor("", ", bits = 16", fir)));
+    assert_eq!(floor("", ", bits = 12", fir), 80.0);
+    assert_eq!(floor(", floor_db = 80", "", fir), 80.0);
+    assert_eq!(floor("", "", "method = \"h2\", taps = 48"), 80.0);
+}
