@@ -149,7 +149,7 @@ impl Args {
             return tracked::fuse_stamps(job, &self.inputs, &self.reading.format());
         }
         let track = self.instants.track.file();
-        let tracked = track.map(|table| tracked::fusion(job, table)).transpose()?;
+        let tracked = track.map(|table| tracked::table_fusion(job, table)).transpose()?;
         let mut reader = self.start_reader(job, &mut |stall| observer.stalled(stall))?;
         if self.bit_true.is_wanted() {
             return self.bit_true.fuse(job, &mut reader, observer, || self.measured(job));

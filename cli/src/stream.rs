@@ -13,6 +13,8 @@ use hybank::captures::FileFormat;
 use hybank::io::{Coding, Container, PcmFormat, is_self_describing};
 use hybank::messages::Quoted;
 use hybank::pipeline::DroppedLatency;
+use hybank::quantity;
+use hybank::units::Hertz;
 use std::path::PathBuf;
 
 /// Fuses slow samples as they arrive
@@ -65,12 +67,28 @@ pub(super) struct Args {
     #[arg(short, long, default_value = "-")]
     output: PathBuf,
     /// Output the last samples at the end, as many as the latency, with zeros for input
-    #[arg(long, conflicts_with = "track", hide_short_help = true)]
+    #[arg(long, conflicts_with_all = ["track", "pilot"], hide_short_help = true)]
     flush: bool,
     #[command(flatten)]
     track: TrackArgs,
+    /// Follow delays that change by a tone beside the signal, whose frequency is known to 100 ppm
+    ///
+    /// Its phases in blocks of 2048 frames tell the delays, from those of the bank on; the samples come one
+    /// and a half blocks later. Where it is not heard the delays stay, with a warning.
+    #[arg(long, value_name = "F", value_parser = pilot, conflicts_with_all =
+          ["track", "algorithm", "gaps", "report", "threads"])]
+    pilot: Option<Hertz>,
     #[command(flatten)]
     run: RunArgs,
+}
+
+/// The frequency of a pilot.
+fn pilot(text: &str) -> Result<Hertz, String> {
+    match quantity::frequency(text) {
+        Ok(frequency) if frequency.0 > 0.0 => Ok(frequency),
+        Ok(frequency) => Err(format!("the pilot is at {frequency}; give a frequency above 0")),
+        Err(error) => Err(error.to_string()),
+    }
 }
 
 /// The coding of the output; tables are only read.
@@ -138,7 +156,9 @@ impl Args {
     ) -> Result<(), Failure> {
         // Before the inputs come; their headers may say complex samples.
         let plan = job.plan()?;
-        let tracked = self.track.file().map(|table| tracked::fusion(job, table)).transpose()?;
+        let by_table = self.track.file().map(|table| tracked::table_fusion(job, table));
+        let moving =
+            by_table.or_else(|| self.pilot.map(|tone| tracked::pilot_fusion(job, tone))).transpose()?;
         let channels = self.channels.map(usize::from);
         let format = FileFormat {
             coding: self.format,
@@ -150,7 +170,7 @@ impl Args {
         };
         let mut reader = job.start_reader(inputs, format, &mut |stall| observer.stalled(stall))?;
         self.check_output(reader.is_complex())?;
-        if let Some(fusion) = tracked {
+        if let Some(fusion) = moving {
             return tracked::run(job, fusion, reader, observer);
         }
         let finished = job.run(&plan, &mut reader, observer, &|_| {})?;

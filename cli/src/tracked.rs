@@ -1,5 +1,5 @@
-//! `--track` of `fuse` and `stream`, and `fuse --stamps`: delays and levels that change, from a table, and
-//! samples with stamps of their own.
+//! `--track` of `fuse` and `stream`, `stream --pilot` and `fuse --stamps`: delays and levels that change,
+//! from a table or by a tone, and samples with stamps of their own.
 
 use super::interrupt::interrupts;
 use super::observer::RunObserver;
@@ -15,12 +15,13 @@ use hybank::captures::{Converters, FileFormat, LevelTrack};
 use hybank::files::{Bound, commit_all, read_text};
 use hybank::io::table::{TableOptions, read_stamped};
 use hybank::io::{MultiReader, RecordedFrames};
-use hybank::merge::{DelayTrack, MergeError, PredictedQuality, TrackedFusion, fuse_stamped};
+use hybank::merge::{DelayTrack, MergeError, PilotFusion, PredictedQuality, TrackedFusion, fuse_stamped};
 use hybank::messages::{Quoted, counted};
 use hybank::pipeline::{Block, FileOutputs, Warning};
 use hybank::quantity::readable;
 use hybank::runtime::FrameSource;
-use hybank::units::Seconds;
+use hybank::sampling::median;
+use hybank::units::{Hertz, Seconds};
 use std::path::{Path, PathBuf};
 
 /// Lines of more delays than a day has at ten a second.
@@ -70,6 +71,9 @@ struct TrackedReport {
     /// By how much the gains and offsets of the table change, if it has them.
     #[serde(skip_serializing_if = "Option::is_none")]
     levels: Option<LevelChange>,
+    /// The delays are those of a tone; what they err by is not in the prediction.
+    #[serde(skip)]
+    by_tone: bool,
     /// True if a signal ended the stream.
     interrupted: bool,
     warnings: Vec<String>,
@@ -95,7 +99,7 @@ pub(super) struct TableFusion {
 }
 
 /// What fuses by the delays, gains and offsets of a table.
-pub(super) fn fusion(job: &BankRun<'_>, table: &Path) -> Result<TableFusion, Failure> {
+pub(super) fn table_fusion(job: &BankRun<'_>, table: &Path) -> Result<MovingFusion, Failure> {
     let Drift { delays, levels } = read(table, job.bank)?;
     let corrected = levels.as_ref().map(LevelTrack::bank);
     let fusion = TrackedFusion::new(corrected.as_ref().unwrap_or(job.bank), &delays);
@@ -103,7 +107,7 @@ pub(super) fn fusion(job: &BankRun<'_>, table: &Path) -> Result<TableFusion, Fai
         MergeError::Design(_) | MergeError::OwnRates => failed_at(job.bank_path, error),
         error => failed_at(table, error),
     })?;
-    Ok(TableFusion { fusion, levels, frames: 0 })
+    Ok(MovingFusion::Table(TableFusion { fusion, levels, frames: 0 }))
 }
 
 impl TableFusion {
@@ -116,17 +120,76 @@ impl TableFusion {
     }
 }
 
+/// What fuses by a tone beside the signal.
+pub(super) fn pilot_fusion(job: &BankRun<'_>, tone: Hertz) -> Result<MovingFusion, Failure> {
+    let fusion = PilotFusion::new(job.bank, tone).map_err(|error| failed_at(job.bank_path, error))?;
+    Ok(MovingFusion::Pilot(Box::new(fusion)))
+}
+
+/// What fuses while delays move.
+pub(super) enum MovingFusion {
+    Table(TableFusion),
+    Pilot(Box<PilotFusion>),
+}
+
+/// What is left at the end of the samples.
+struct Last {
+    samples: Vec<f64>,
+    quality: PredictedQuality,
+    levels: Option<LevelChange>,
+    warning: Option<String>,
+}
+
+impl MovingFusion {
+    fn push(&mut self, channels: Vec<Vec<f64>>) -> Result<Vec<f64>, MergeError> {
+        match self {
+            Self::Table(fusion) => fusion.push(channels),
+            Self::Pilot(fusion) => fusion.push(&channels),
+        }
+    }
+
+    fn finish(self) -> Result<Last, MergeError> {
+        match self {
+            Self::Table(TableFusion { fusion, levels, .. }) => {
+                let (samples, quality) = fusion.finish()?;
+                Ok(Last { samples, quality, levels: levels.as_ref().map(LevelTrack::change), warning: None })
+            }
+            Self::Pilot(fusion) => {
+                let (blocks, silent) = (fusion.blocks(), fusion.silent_blocks());
+                let (samples, quality) = fusion.finish()?;
+                Ok(Last { samples, quality, levels: None, warning: of_silence(blocks, silent) })
+            }
+        }
+    }
+}
+
+/// What a user must know of a pilot that was not heard.
+fn of_silence(blocks: usize, silent: usize) -> Option<String> {
+    let blocks_of_all = counted(blocks, "block");
+    match (blocks, silent) {
+        (0, _) => Some(
+            "the samples ended before the pilot told anything, so the delays are those of the bank; it takes 2048 frames"
+                .into(),
+        ),
+        (_, 0) => None,
+        _ => Some(format!(
+            "the pilot told nothing in {silent} of {blocks_of_all}, where the delays stayed as they were; check its \
+             frequency and its level"
+        )),
+    }
+}
+
 /// Fuses what `reader` gives.
 pub(super) fn run(
     job: &BankRun<'_>,
-    fusion: TableFusion,
+    fusion: MovingFusion,
     mut reader: MultiReader,
     observer: &mut RunObserver,
 ) -> Result<(), Failure> {
     let rate = job.output_rate(&reader)?;
     if reader.is_complex() {
         return Err(Failure::Input(
-            "--track: the samples are complex, and only real ones are fused by a table".into(),
+            "the samples are complex, and only real ones are fused by --track and --pilot".into(),
         ));
     }
     let mut outputs = job.outputs(rate, false)?;
@@ -152,21 +215,21 @@ struct TrackedRun<'a> {
 impl TrackedRun<'_> {
     fn all(
         mut self,
-        mut fusion: TableFusion,
+        mut fusion: MovingFusion,
         reader: &mut MultiReader,
         observer: &mut RunObserver,
     ) -> Result<(), Failure> {
+        let by_tone = matches!(fusion, MovingFusion::Pilot(_));
         let interrupted = each_block(reader, observer, |_, recordings| {
             self.write(&fusion.push(channels(recordings)).map_err(failed)?)
         })?;
-        let levels = fusion.levels.as_ref().map(LevelTrack::change);
-        let (last, quality) = fusion.fusion.finish().map_err(failed)?;
+        let Last { samples: last, quality, levels, warning } = fusion.finish().map_err(failed)?;
         self.write(&last)?;
         let Self { job, outputs, rate, samples, clipped } = self;
         let clipped =
             (clipped > 0).then(|| format!("{}; {} keeps them", Warning::Clipped(clipped), job.lossless));
         let warnings: Vec<String> =
-            reader.warnings().iter().map(ToString::to_string).chain(clipped).collect();
+            reader.warnings().iter().map(ToString::to_string).chain(clipped).chain(warning).collect();
         check_strict(&warnings, job.args.strict)?;
         outputs.finish().map_err(stopped)?;
         warnings.iter().for_each(|text| warn(text));
@@ -177,6 +240,7 @@ impl TrackedRun<'_> {
             job,
             TrackedReport {
                 levels,
+                by_tone,
                 interrupted,
                 warnings,
                 ..TrackedReport::new(samples, rate, 0.0, quality)
@@ -278,7 +342,7 @@ impl Drift {
         let levels = levels.transpose().map_err(|error| failed_at(path, error))?;
         let seconds = |column: Vec<f64>| column.into_iter().map(Seconds).collect();
         let delays = delays.unwrap_or_default().into_iter().map(seconds).collect();
-        Ok(Self { delays: DelayTrack { times, delays }, levels })
+        Ok(Self { delays: DelayTrack { times, delays, half_widths: Vec::new() }, levels })
     }
 }
 
@@ -288,6 +352,8 @@ struct DriftLine {
     frame: u64,
     /// D_i in seconds; of a channel of which the line says nothing none.
     delay: Vec<Option<f64>>,
+    #[serde(default)]
+    half_width: Vec<Option<f64>>,
     /// g_i and o_i, where those of some channel change.
     gain: Option<Vec<f64>>,
     offset: Option<Vec<f64>>,
@@ -302,10 +368,10 @@ impl DriftLine {
 
 fn read_lines(path: &Path, bank: &Bank) -> Result<Drift, Failure> {
     let text = read_text(path, TABLE).map_err(failed)?;
-    let (mut times, mut lines) = (Vec::new(), Vec::new());
+    let (mut times, mut lines, mut half_widths) = (Vec::new(), Vec::new(), Vec::new());
     for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let refused = |problem: String| failed_at(path, format!("line {}: {problem}", number + 1));
-        let line: DriftLine = serde_json::from_str(line).map_err(|error| refused(error.to_string()))?;
+        let mut line: DriftLine = serde_json::from_str(line).map_err(|error| refused(error.to_string()))?;
         let wanted = bank.channel_count();
         let lengths =
             [Some(line.delay.len()), line.gain.as_ref().map(Vec::len), line.offset.as_ref().map(Vec::len)];
@@ -315,6 +381,7 @@ fn read_lines(path: &Path, bank: &Bank) -> Result<Drift, Failure> {
             }
         }
         let time = Seconds(line.frame as f64 * bank.slow_period().0);
+        let half_width = std::mem::take(&mut line.half_width);
         // A line that says nothing of a channel is left to the lines around it.
         let Some(values) = line.values() else { continue };
         let first = lines.first().unwrap_or(&values);
@@ -325,6 +392,7 @@ fn read_lines(path: &Path, bank: &Bank) -> Result<Drift, Failure> {
         }
         times.push(time);
         lines.push(values);
+        half_widths.push(half_width);
     }
     let column =
         |kind: usize, i: usize| lines.iter().filter_map(|line| Some(line[kind].as_ref()?[i])).collect();
@@ -332,7 +400,15 @@ fn read_lines(path: &Path, bank: &Bank) -> Result<Drift, Failure> {
         let is_given = kind == 0 || lines.first().is_some_and(|line| line[kind].is_some());
         is_given.then(|| (0..bank.channel_count()).map(|i| column(kind, i)).collect())
     };
-    Drift::new(path, bank, times, [0, 1, 2].map(columns))
+    // At the ends, and beside what is lost, delays are known far worse than elsewhere.
+    let usual = |i: usize| {
+        let all = half_widths.iter().filter_map(|line| line.get(i).copied().flatten());
+        Seconds(median(all.filter(|half_width| *half_width >= 0.0).collect()))
+    };
+    let usual = (0..bank.channel_count()).map(usual).collect();
+    let mut drift = Drift::new(path, bank, times, [0, 1, 2].map(columns))?;
+    drift.delays.half_widths = usual;
+    Ok(drift)
 }
 
 impl TrackedReport {
@@ -345,6 +421,7 @@ impl TrackedReport {
             worst_second_db: quality.worst_second.0,
             worst_second_at: quality.worst_at.0,
             levels: None,
+            by_tone: false,
             interrupted: false,
             warnings: Vec::new(),
         }
@@ -359,13 +436,14 @@ fn report(job: &BankRun<'_>, report: TrackedReport) -> Result<(), Failure> {
         return Ok(());
     }
     print(&format!(
-        "{}: {} at {}, predicted SNR {:.1} dB, {:.1} dB in the worst second ({:.1} s after the beginning){}\n",
+        "{}: {} at {}, predicted SNR {:.1} dB, {:.1} dB in the worst second ({:.1} s after the beginning){}{}\n",
         Quoted(job.output),
         counted(report.samples, "sample"),
         readable(report.rate, "S/s"),
         report.predicted_snr_db,
         report.worst_second_db,
         report.worst_second_at,
+        if report.by_tone { ", if the delays are right" } else { "" },
         report.levels.map_or_else(String::new, level_text)
     ))
 }

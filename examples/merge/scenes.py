@@ -181,6 +181,12 @@ def run(name, folder, seconds=float(os.environ.get("SECONDS_OF_SCENE", 16))):
     merged, _ = soundfile.read(output)
     # The clock of the result is that of the first recorder.
     t = times[0][report["first_sample"]] + np.arange(len(merged)) / rate / (1 + 1e-6 * recorders[0].ppm)
+    return judged(name, x, (times, samples), (t, merged), told)
+
+
+def judged(name, x, recorded, result, told):
+    """A row: the result at its instants beside what spline, best recorder and mean give there."""
+    (times, samples), (t, merged) = recorded, result
     truth = values(x, MASTER, t)
     inner = slice(int(0.05 * len(t)), int(0.95 * len(t)))
 
@@ -189,7 +195,6 @@ def run(name, folder, seconds=float(os.environ.get("SECONDS_OF_SCENE", 16))):
 
     def even(number):
         """One recorder alone, by its true clock, as any resampler with a long window gives it."""
-        recorder = recorders[number]
         place = np.interp(t, times[number], np.arange(len(times[number])))
         return values(samples[number], 1.0, place)
 
@@ -197,14 +202,59 @@ def run(name, folder, seconds=float(os.environ.get("SECONDS_OF_SCENE", 16))):
     order = np.argsort(together)
     keep = np.concatenate([[True], np.diff(together[order]) > 1e-9])
     spline = CubicSpline(together[order][keep], np.concatenate(samples)[order][keep])(t)
-    alone = [even(number) for number in range(len(recorders))]
+    alone = [even(number) for number in range(len(times))]
     return row(name, snr(merged), told, snr(spline), max(map(snr, alone)), snr(np.mean(alone, axis=0)))
+
+
+PILOT = 1_000.0
+PILOT_SPEC = """
+fast_rate = 48000
+ratio = 2
+latency = 20
+target = {{ filter = {{ family = "butterworth", order = 2, cutoff = 22000 }} }}
+signal = {{ band = 18000, rms = {rms} }}
+channel = [{{ delay = 0, bits = 16, noise = 3e-5 }}, {{ delay = "18 us", bits = 16, noise = 3e-5 }}]
+design = {{ method = "h2", taps = 48 }}
+"""
+
+
+def run_pilot(name, folder, seconds=float(os.environ.get("SECONDS_OF_SCENE", 16))):
+    """Converters that are started together and drift apart: a tone below the signal tells by how much."""
+    x = signal("music", seconds + 3, 3, 18e3)
+    f = np.fft.rfftfreq(len(x), 1 / MASTER)
+    x = np.fft.irfft(np.fft.rfft(x) * np.clip((f - 1800) / 400, 0, 1), len(x))
+    x += 0.02 * np.cos(2 * np.pi * PILOT * np.arange(len(x)) / MASTER)
+    rng = np.random.default_rng(9)
+    recorders = [Recorder(24_000, 0.5), Recorder(24_000, 0.5 - 18e-6, 0.6)]
+    recorded = [recorder.record(x, seconds, rng) for recorder in recorders]
+    files = [f"{folder}/{number}.wav" for number in range(len(recorded))]
+    for (_, y), file in zip(recorded, files):
+        soundfile.write(file, y, 24_000, subtype="PCM_16")
+    spec, bank, drift, output = (f"{folder}/{file}" for file in ("spec.toml", "bank.json", "drift.jsonl", "fast.wav"))
+    with open(spec, "w") as file:
+        file.write(PILOT_SPEC.format(rms=np.std(x)))
+    inputs = [word for file in files for word in ("--input", file)]
+    commands = {
+        "pilot, stream": [["stream", bank, *inputs, "--format", "wav", "-o", output, "--pilot", f"{PILOT}Hz"]],
+        "pilot, fuse": [
+            ["calibrate", spec, *files, "-o", f"{folder}/measured.toml", "--tone", f"{PILOT}Hz", "--drift", drift],
+            ["fuse", bank, *files, "-o", output, "--track", drift],
+        ],
+    }
+    for command in [["design", spec, "-o", bank, "--no-proof"], *commands[name]]:
+        told = subprocess.run([HYBANK, *command, "--json", "--force"], capture_output=True, text=True)
+        if told.returncode:
+            return f"{name:18} {told.stderr.strip()}"
+    merged, rate = soundfile.read(output)
+    t = recorded[0][0][0] + np.arange(len(merged)) / rate
+    return judged(name, x, tuple(zip(*recorded)), (t, merged), told)
 
 
 if __name__ == "__main__":
     sys.argv_extra = [a for a in sys.argv[1:] if a.startswith("--")]
-    names = [a for a in sys.argv[1:] if not a.startswith("--")] or [*SCENES, *STAMPED]
+    names = [a for a in sys.argv[1:] if not a.startswith("--")] or [*SCENES, "pilot, stream", "pilot, fuse", *STAMPED]
     print("SNR in dB; spline: cubic, through all samples at their true instants; the others by the true clocks")
     with tempfile.TemporaryDirectory() as folder:
         for name in names:
-            print((run_stamped if name in STAMPED else run)(name, folder), flush=True)
+            how = run_stamped if name in STAMPED else run_pilot if name.startswith("pilot") else run
+            print(how(name, folder), flush=True)

@@ -1,5 +1,6 @@
 //! Fusion of samples as they arrive.
 
+use super::clock::Clock;
 use super::demand::within;
 use super::estimator::Estimator;
 use super::fusion::{FRAMES_PER_BLOCK, Fused, FusionSettings, KnownInstantFusion, Layout};
@@ -11,6 +12,9 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
+
+/// Blocks of a stretch in which a clock of 120 ppm drifts by a sixteenth of its period.
+const BLOCKS_OF_UNKNOWN_CLOCKS: usize = 8;
 
 /// The taps of a stretch, once they are made.
 type Taps = Arc<OnceLock<Result<Option<Stretch>, LinalgError>>>;
@@ -29,9 +33,9 @@ pub struct LiveFusion {
 }
 
 /// All that taps depend on.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct TapMaker {
-    estimator: Estimator,
+    estimator: Arc<Estimator>,
     /// Without samples.
     clocks: Vec<Recording>,
     layout: Layout,
@@ -59,8 +63,28 @@ impl LiveFusion {
     pub fn new(estimator: Estimator, recordings: Vec<Recording>, first: FastPeriods, reach: usize) -> Self {
         let layout = Layout::new(&estimator, &recordings, FusionSettings { first, count: 0, reach });
         let within = within(&estimator);
-        let maker = TapMaker { estimator, clocks: recordings.clone(), layout, within };
+        let maker = TapMaker { estimator: Arc::new(estimator), clocks: recordings.clone(), layout, within };
         Self { maker: Arc::new(maker), recordings, blocks: 0, taps: BTreeMap::new() }
+    }
+
+    /// The same for clocks of which nothing is known but that they differ by at most 120 ppm.
+    pub fn with_unknown_clocks(mut self) -> Self {
+        let maker = Arc::make_mut(&mut self.maker);
+        maker.layout.length = maker.layout.length.min(FRAMES_PER_BLOCK * BLOCKS_OF_UNKNOWN_CLOCKS);
+        self
+    }
+
+    /// From now on the recordings have these clocks: those that they had, as far as there are samples.
+    pub fn follow(&mut self, clocks: impl IntoIterator<Item = Clock>) {
+        let mut maker = TapMaker::clone(&self.maker);
+        let recordings = self.recordings.iter_mut().zip(&mut maker.clocks);
+        for ((own, other), clock) in recordings.zip(clocks) {
+            let clock = Arc::new(clock);
+            own.follow(Arc::clone(&clock));
+            other.follow(clock);
+        }
+        self.maker = Arc::new(maker);
+        self.taps.clear();
     }
 
     /// Outputs of a block.

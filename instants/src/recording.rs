@@ -38,6 +38,11 @@ impl Recording {
         }));
     }
 
+    /// From now on it has another clock.
+    pub(super) fn follow(&mut self, clock: Arc<Clock>) {
+        self.clock = clock;
+    }
+
     /// Lets go of the samples before an instant.
     pub(super) fn forget(&mut self, before: FastPeriods) {
         let end = self.clock.sample_at(before).max(0.0) as usize;

@@ -2,11 +2,16 @@
 
 use super::estimates::ChannelEstimate;
 use crate::sampling::nonuniform::Measured;
-use crate::sampling::{Known, LearnedCourse};
+use crate::sampling::{Known, LearnedCourse, usual_deviation};
 use crate::sine_fit::Estimate;
 use crate::spec::{ChannelSpec, HALF_WIDTH, Spec};
 use crate::units::Seconds;
 use serde::Serialize;
+
+/// Readings whose scatter says how far they err, at least, and the share of the stated deviations that it
+/// stays below.
+const LEAST_SCATTERED: usize = 8;
+const CLEARLY_LESS: f64 = 0.5;
 
 /// The delays at one frame, and the gains and offsets where those change.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,7 +80,20 @@ pub(super) fn course(pieces: impl Iterator<Item = (f64, Estimate<f64>)>, nominal
         jitter: 0.0,
     };
     let steady = LearnedCourse::Steady(Known { value: nominal, deviation: 0.0 });
-    LearnedCourse::new(&pieces.map(measured).collect::<Vec<_>>()).unwrap_or(steady)
+    LearnedCourse::new(&by_scatter(&pieces.map(measured).collect::<Vec<_>>())).unwrap_or(steady)
+}
+
+/// Readings with the deviation that they scatter by, where they state far larger ones: a signal beside a
+/// tone counts as white noise there, and leaves the tone alone where it lies at other frequencies.
+fn by_scatter(readings: &[Measured]) -> Vec<Measured> {
+    // What a line through both neighbours leaves of one of three has the variance 3/2.
+    let left = readings.windows(3).map(|three| {
+        let beside = 0.5 * (three[0].value + three[2].value);
+        (three[1].value - beside).abs() / (1.5_f64.sqrt() * three[1].error)
+    });
+    let scatter = if readings.len() < LEAST_SCATTERED { 1.0 } else { usual_deviation(left.collect()) };
+    let share = if scatter < CLEARLY_LESS { scatter } else { 1.0 };
+    readings.iter().map(|one| Measured { error: one.error * share, ..*one }).collect()
 }
 
 /// The largest and the least value of a course at some positions.

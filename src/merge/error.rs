@@ -122,6 +122,18 @@ pub enum MergeError {
         /// Where, from 0.
         frame: f64,
     },
+    /// A pilot that has no phase of its own.
+    #[error(
+        "the pilot at {tone} lies at a multiple of half the converters' rate of {}, where it folds onto its mirror image; \
+         choose another frequency",
+        readable(rate.0, "S/s")
+    )]
+    Pilot {
+        /// Its frequency.
+        tone: Hertz,
+        /// The rate of a converter.
+        rate: Hertz,
+    },
     /// The converters of a bank are not known.
     #[error(transparent)]
     Design(#[from] DesignError),

@@ -8,10 +8,13 @@
 mod clocks;
 mod course;
 mod error;
+mod phasor;
+mod pilot;
 mod tracked;
 
 pub use course::PredictedQuality;
 pub use error::{MergeError, MergeWarning};
+pub use pilot::PilotFusion;
 pub use tracked::{DelayTrack, Tracked, TrackedFusion, fuse_stamped};
 
 use crate::align::{ClockStep, lost_zeros};

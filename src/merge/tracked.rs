@@ -6,6 +6,7 @@ use super::{REACH, check_memory};
 use crate::bank::Bank;
 use crate::design;
 use crate::instants::{Clock, ClockError, FusionSettings, LiveFusion, Recording, fuse};
+use crate::spec::OneOrEach;
 use crate::units::{FastPeriods, Hertz, Seconds};
 
 /// Share of the rate of the converter below which stamps are those of something else.
@@ -18,6 +19,9 @@ pub struct DelayTrack {
     pub times: Vec<Seconds>,
     /// Those of each converter, as many as times: D_i as in a spec.
     pub delays: Vec<Vec<Seconds>>,
+    /// Half-widths of the 95 % intervals in which they usually are, one for each converter; none if they are
+    /// exact.
+    pub half_widths: Vec<Seconds>,
 }
 
 /// The fused recording.
@@ -62,10 +66,27 @@ impl TrackedFusion {
         let recordings: Vec<Recording> =
             (0..bank.channel_count()).map(recording).collect::<Result<_, MergeError>>()?;
         let settings = FusionSettings { first: FastPeriods(0.0), count: 0, reach: REACH };
-        let estimator = design::instants_estimator(&with_instants(bank), settings.longest(&recordings))?;
-        let fusion = LiveFusion::new(estimator, recordings, settings.first, REACH);
+        let estimator = design::instants_estimator(
+            &with_instants(bank, &track.half_widths),
+            settings.longest(&recordings),
+        )?;
+        let mut fusion = LiveFusion::new(estimator, recordings, settings.first, REACH);
+        if track.times.len() == 1 {
+            fusion = fusion.with_unknown_clocks();
+        }
         let course = InnerCourse::new(bank.fast_period * fusion.block() as f64);
         Ok(Self { fusion, bank: bank.clone(), frames: 0, course })
+    }
+
+    /// From now on the delays are those of another table: those of the one before, as far as there are
+    /// samples.
+    ///
+    /// # Errors
+    /// [`MergeError`] for delays that jump by a sample and more.
+    pub(super) fn follow(&mut self, track: &DelayTrack) -> Result<(), MergeError> {
+        let clocks = (0..self.bank.channel_count()).map(|i| clock(&self.bank, track, i));
+        self.fusion.follow(clocks.collect::<Result<Vec<_>, _>>()?);
+        Ok(())
     }
 
     /// Takes the next samples of each channel, as many of all, and gives the outputs that depend on no later
@@ -96,12 +117,13 @@ impl TrackedFusion {
     }
 }
 
-/// The bank for samples whose instants are known: how uncertain the delays of its spec are, which may be how
-/// far they move, says nothing of them.
-fn with_instants(bank: &Bank) -> Bank {
+/// The bank for samples whose instants are known so well: how uncertain the delays of its spec are, which
+/// may be how far they move, says nothing of them.
+fn with_instants(bank: &Bank, half_widths: &[Seconds]) -> Bank {
     let mut bank = bank.clone();
-    if let Some(uncertainty) = bank.spec.as_mut().and_then(|spec| spec.uncertainty.as_mut()) {
-        uncertainty.delay = None;
+    if let Some(spec) = bank.spec.as_mut() {
+        let stated = spec.uncertainty.get_or_insert_default();
+        stated.delay = (!half_widths.is_empty()).then(|| OneOrEach::Each(half_widths.to_vec()));
     }
     bank
 }
@@ -144,7 +166,7 @@ pub fn fuse_stamped(
         Recording::new(samples.iter().map(|x| bank.corrected(i, *x)).collect(), clock, i)
     };
     let recordings: Vec<Recording> = channels.iter().enumerate().zip(clocks).map(recording).collect();
-    let estimator = design::instants_estimator(&with_instants(bank), settings.longest(&recordings))?;
+    let estimator = design::instants_estimator(&with_instants(bank, &[]), settings.longest(&recordings))?;
     let fused = fuse(&estimator, &recordings, settings)?;
     let mut course = InnerCourse::new(bank.fast_period * fused.block as f64);
     let samples = course.judged(fused);
@@ -227,6 +249,7 @@ mod tests {
         let times: Vec<Seconds> = (0..=20).map(|k| Seconds(0.05 * f64::from(k))).collect();
         let track = DelayTrack {
             delays: vec![vec![Seconds(0.0); 21], times.iter().map(|t| Seconds(delay(t.0))).collect()],
+            half_widths: Vec::new(),
             times,
         };
         let own = |k: usize| k as f64 / 24_000.0;
@@ -295,11 +318,12 @@ mod tests {
         let track = |delays: Vec<Vec<f64>>| DelayTrack {
             times: vec![Seconds(0.0), Seconds(1e-3)],
             delays: delays.into_iter().map(|column| column.into_iter().map(Seconds).collect()).collect(),
+            half_widths: Vec::new(),
         };
         let refused = |delays| fuse_tracked(&bank, &channels, &track(delays)).unwrap_err().to_string();
         assert!(refused(vec![vec![0.0; 2]]).contains("1 column of delays, and the bank has 2 channels"));
         assert!(refused(vec![vec![0.0; 2], vec![0.0, 2e-3]]).contains("channel 2"));
-        let none = DelayTrack { times: Vec::new(), delays: vec![Vec::new(); 2] };
+        let none = DelayTrack { times: Vec::new(), delays: vec![Vec::new(); 2], half_widths: Vec::new() };
         assert_eq!(fuse_tracked(&bank, &channels, &none), Err(MergeError::NoDelays));
         let still = track(vec![vec![0.0; 2]; 2]);
         assert_eq!(fuse_tracked(&bank, &[vec![], vec![]], &still), Err(MergeError::NoSamples));

@@ -283,6 +283,33 @@ fn snr_of(desk: &Desk, file: &str) -> f64 {
     wav::snr_db(&wav::samples(desk, file), &wav::samples(desk, "cap/target.wav"), 500)
 }
 
+/// The same clocks by one of the tones.
+#[test]
+fn a_stream_follows_a_pilot() {
+    let desk = two_converters("10us");
+    let tones = "tones:440Hz,3.1kHz,7.3kHz,11.9kHz,16.1kHz";
+    let simulate = format!("simulate bank.json --source {tones} --samples 96000 --drift 0,5 -o cap");
+    desk.good(&words(&simulate));
+    let args =
+        words("stream bank.json --input cap/ch1.wav --input cap/ch2.wav --format wav -o y.wav --force");
+    let with = |more: &[&'static str]| [&args[..], more].concat();
+    desk.good(&with(&["--pilot", "440Hz"]));
+    let found = snr_of(&desk, "y.wav");
+    assert!(found > 50.0, "{found}");
+    // Nothing is at this frequency: said, and the delays stay.
+    let output = desk.run(&with(&["--pilot", "5kHz"]), &[]);
+    let said = text(&output.stderr);
+    assert!(output.status.success() && said.contains("told nothing in 23 of 23 blocks"), "{said}");
+    assert!(snr_of(&desk, "y.wav") < 40.0);
+    for (more, part) in [
+        (&["--pilot", "0"][..], "above 0"),
+        (&["--pilot", "1", "--flush"], "--flush"),
+        (&["--pilot", "1", "--track", "x.csv"], "--track"),
+    ] {
+        desk.refused(2, &with(more), &[part]);
+    }
+}
+
 /// Clocks that drift by 5 ppm over 2 s: the taps follow the delays of a table, of either kind.
 #[test]
 fn a_table_of_delays_is_followed() {

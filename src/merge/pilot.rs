@@ -1,0 +1,269 @@
+//! Converters whose delays a tone beside the signal tells while their samples arrive: a pilot.
+
+use super::PredictedQuality;
+use super::error::MergeError;
+use super::phasor::Phasor;
+use super::tracked::{DelayTrack, TrackedFusion};
+use crate::bank::Bank;
+use crate::calibrate::usual_reference;
+use crate::design::Problem;
+use crate::linalg::Complex;
+use crate::sampling::LearnedCourse;
+use crate::sampling::nonuniform::Measured;
+use crate::units::{FastPeriods, Hertz, Seconds};
+use std::collections::VecDeque;
+use std::f64::consts::TAU;
+
+/// Frames of a block, of which the tone tells the delays in the middle.
+const FRAMES: usize = 2048;
+/// Most readings that say together what a delay is now, and fewest: of less each speaks for itself.
+const READINGS: usize = 32;
+const LEAST_READINGS: usize = 8;
+/// Readings of the delays that are kept: no output needs the samples before them.
+const KEPT: usize = 4;
+
+/// The fusion of samples, NaN where they were lost, as they arrive at the converters of a bank. Their delays
+/// follow from the phases of a tone, block by block, as the changes within a period of the tone. Outputs
+/// come when half of the block after the next one is there.
+#[derive(Debug)]
+pub struct PilotFusion {
+    fusion: TrackedFusion,
+    fast_period: Seconds,
+    ratio: usize,
+    /// Cycles of the tone per sample, and its period.
+    cycles: f64,
+    period: FastPeriods,
+    /// What the front ends and gains make of it.
+    responses: Vec<Complex<f64>>,
+    reference: usize,
+    /// The delays now.
+    delays: Vec<FastPeriods>,
+    /// Samples of each channel that are not fused yet.
+    waiting: Vec<Vec<f64>>,
+    /// The first frame of them, and that of the next block.
+    first: usize,
+    next: usize,
+    /// What the last blocks say of each channel.
+    readings: Vec<VecDeque<Measured>>,
+    /// The delays in the middle of the last blocks.
+    track: DelayTrack,
+    silent: usize,
+}
+
+impl PilotFusion {
+    /// From the first frame on, by a tone of this analog frequency, which is known to 100 ppm.
+    ///
+    /// # Errors
+    /// As [`TrackedFusion::new`], and [`MergeError::Pilot`] for a tone that folds onto its mirror image.
+    pub fn new(bank: &Bank, tone: Hertz) -> Result<Self, MergeError> {
+        let delays = bank.delays.iter().map(|delay| vec![*delay]).collect();
+        let track = DelayTrack { times: vec![Seconds(0.0)], delays, half_widths: Vec::new() };
+        let fusion = TrackedFusion::new(bank, &track)?;
+        let problem = Problem::of_bank(bank)?;
+        let w = tone.angular().per_fast_period(bank.fast_period);
+        let cycles = tone.0 * bank.slow_period().0;
+        if Phasor::is_mirrored(cycles, FRAMES) {
+            return Err(MergeError::Pilot { tone, rate: Hertz(1.0 / bank.slow_period().0) });
+        }
+        let channels = problem.channels.iter();
+        let responses =
+            channels.map(|channel| problem.response(channel.front_end, w) * channel.gain).collect();
+        let count = bank.channel_count();
+        Ok(Self {
+            fusion,
+            fast_period: bank.fast_period,
+            ratio: bank.ratio,
+            cycles,
+            period: FastPeriods(1.0 / (tone.0 * bank.fast_period.0)),
+            responses,
+            reference: bank.spec.as_ref().map_or(0, usual_reference),
+            delays: bank.delays.iter().map(|delay| delay.in_fast_periods(bank.fast_period)).collect(),
+            waiting: vec![Vec::new(); count],
+            first: 0,
+            next: 0,
+            readings: vec![VecDeque::new(); count],
+            track,
+            silent: 0,
+        })
+    }
+
+    /// Blocks so far.
+    pub fn blocks(&self) -> usize {
+        self.next / FRAMES
+    }
+
+    /// Those of them of which the tone says nothing: the delays stay.
+    pub fn silent_blocks(&self) -> usize {
+        self.silent
+    }
+
+    /// Takes the next samples of each channel, as many of all, and gives the outputs that depend on no later
+    /// ones.
+    ///
+    /// # Errors
+    /// [`MergeError::Singular`]; [`MergeError::Track`] for delays that jump by a sample and more.
+    pub fn push(&mut self, channels: &[Vec<f64>]) -> Result<Vec<f64>, MergeError> {
+        self.waiting.iter_mut().zip(channels).for_each(|(waiting, samples)| waiting.extend(samples));
+        let mut outputs = Vec::new();
+        while self.first + self.waiting[0].len() >= self.next + FRAMES {
+            self.measure();
+            self.fusion.follow(&self.track)?;
+            self.next += FRAMES;
+            outputs.extend(self.fuse_up_to(self.next - FRAMES / 2)?);
+        }
+        Ok(outputs)
+    }
+
+    /// The last outputs, and how good all of them are.
+    ///
+    /// # Errors
+    /// As [`TrackedFusion::finish`].
+    pub fn finish(mut self) -> Result<(Vec<f64>, PredictedQuality), MergeError> {
+        let mut outputs = self.fuse_up_to(usize::MAX)?;
+        let (last, quality) = self.fusion.finish()?;
+        outputs.extend(last);
+        Ok((outputs, quality))
+    }
+
+    fn fuse_up_to(&mut self, frame: usize) -> Result<Vec<f64>, MergeError> {
+        let count = (frame - self.first).min(self.waiting[0].len());
+        self.first += count;
+        let next: Vec<Vec<f64>> =
+            self.waiting.iter_mut().map(|samples| samples.drain(..count).collect()).collect();
+        self.fusion.push(&next)
+    }
+
+    /// Adds the delays in the middle of the next block. Those of a silent one are those before.
+    fn measure(&mut self) {
+        match self.next_block() {
+            Some(found) => found.into_iter().enumerate().for_each(|(i, reading)| self.take(i, reading)),
+            None => self.silent += 1,
+        }
+        let keep = if self.next == 0 { 0 } else { KEPT };
+        let middle = FastPeriods(((self.next + FRAMES / 2) * self.ratio) as f64);
+        keep_last(&mut self.track.times, keep, middle.in_seconds(self.fast_period));
+        for (all, delay) in self.track.delays.iter_mut().zip(&self.delays) {
+            keep_last(all, keep, delay.in_seconds(self.fast_period));
+        }
+    }
+
+    /// The delay of a channel by one more reading.
+    fn take(&mut self, channel: usize, mut reading: Measured) {
+        let (delay, readings) = (&mut self.delays[channel], &mut self.readings[channel]);
+        reading.value -= ((reading.value - delay.0) / self.period.0).round() * self.period.0;
+        readings.push_back(reading);
+        if readings.len() > READINGS {
+            readings.pop_front();
+        }
+        let course = LearnedCourse::new(readings.make_contiguous());
+        let course = course.filter(|_| readings.len() >= LEAST_READINGS);
+        delay.0 = course.map_or(reading.value, |course| course.at(reading.x).value);
+    }
+
+    /// What the tone says of the delay of each channel in the next block; `None` if it is not heard in all.
+    fn next_block(&self) -> Option<Vec<Measured>> {
+        let from = self.next - self.first;
+        let part = |samples: &Vec<f64>| Phasor::of(&samples[from..from + FRAMES], self.cycles);
+        let heard: Vec<Phasor> = self.waiting.iter().map(part).collect::<Option<_>>()?;
+        let own = heard[self.reference];
+        let middle = (self.next + FRAMES / 2) as f64;
+        let delay = |(phasor, response): (&Phasor, &Complex<f64>)| {
+            let late = phasor.value / response * (own.value / self.responses[self.reference]).conj();
+            let value = self.delays[self.reference].0 - late.arg() * self.period.0 / TAU;
+            let error = phasor.deviation.hypot(own.deviation) * self.period.0 / TAU;
+            Measured { x: middle, value, error, jitter: 0.0 }
+        };
+        Some(heard.iter().zip(&self.responses).map(delay).collect())
+    }
+}
+
+/// Adds a value behind the last `keep` ones.
+fn keep_last<T>(all: &mut Vec<T>, keep: usize, value: T) {
+    all.drain(..all.len().saturating_sub(keep));
+    all.push(value);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design;
+    use crate::spec::Spec;
+
+    const SPEC: &str = "fast_rate = 48000\nratio = 2\n\
+        [target]\nfilter = { family = \"butterworth\", order = 4, cutoff = 14000 }\n\
+        [signal]\nband = 18000\n[[channel]]\ndelay = 0\nbits = 16\n\
+        [[channel]]\ndelay = \"0.9 samples\"\nbits = 16\n\
+        [design]\nmethod = \"h2\"\ntaps = 48\n";
+    const PILOT: f64 = 1007.0;
+
+    fn bank() -> Bank {
+        let spec = Spec::from_toml(SPEC, "test").unwrap();
+        design::design(&spec, &design::DesignOptions::without_proof()).unwrap().bank
+    }
+
+    /// What passes the Butterworth filter, which both converters and the target have: tones, and the pilot.
+    fn value(t: f64) -> f64 {
+        let passed = |f: f64| (1.0 + (f / 14_000.0).powi(8)).sqrt().recip();
+        let tone = |k: u32| {
+            let f = 3000.0 + 14_000.0 * f64::from(k) / 61.0;
+            (TAU * f * t + f64::from(k * k)).cos() * passed(f)
+        };
+        0.01 * (0..61).map(tone).sum::<f64>() + 0.1 * (TAU * PILOT * t).cos() * passed(PILOT)
+    }
+
+    /// Two recordings whose clocks are 20 ppm apart from the delay of the spec on: 0.9 samples early.
+    fn recordings(frames: usize) -> [Vec<f64>; 2] {
+        let rounded = |x: f64| (x * 32768.0).round() / 32768.0;
+        let own = |k: usize| k as f64 / 24_000.0;
+        [
+            (0..frames).map(|k| rounded(value(own(k)))).collect(),
+            (0..frames).map(|k| rounded(value(own(k) * (1.0 + 2e-5) - 0.9 / 48_000.0))).collect(),
+        ]
+    }
+
+    fn fused(channels: &[Vec<f64>; 2], cut: usize) -> (Vec<f64>, PredictedQuality, [usize; 2]) {
+        let mut fusion = PilotFusion::new(&bank(), Hertz(PILOT)).unwrap();
+        let mut samples = Vec::new();
+        for first in (0..channels[0].len()).step_by(cut) {
+            let end = (first + cut).min(channels[0].len());
+            samples.extend(fusion.push(&channels.clone().map(|all| all[first..end].to_vec())).unwrap());
+        }
+        let blocks = [fusion.blocks(), fusion.silent_blocks()];
+        let (last, quality) = fusion.finish().unwrap();
+        samples.extend(last);
+        (samples, quality, blocks)
+    }
+
+    fn snr(samples: &[f64], inner: std::ops::Range<usize>) -> f64 {
+        let (mut error, mut power) = (0.0, 0.0);
+        for n in inner {
+            let truth = value(n as f64 / 48_000.0);
+            error += (samples[n] - truth).powi(2);
+            power += truth * truth;
+        }
+        10.0 * (power / error).log10()
+    }
+
+    /// The delay moves by a whole fast period in a second, and back to the instants of the other converter.
+    #[test]
+    fn delays_follow_a_tone() {
+        let channels = recordings(24_000);
+        let (samples, _, blocks) = fused(&channels, 24_000);
+        assert_eq!((samples.len(), blocks), (48_000, [11, 0]));
+        let found = snr(&samples, 8000..24_000);
+        assert!(found > 55.0, "{found}");
+        let (same, ..) = fused(&channels, 700);
+        assert!(same == samples);
+    }
+
+    /// Where a channel is lost the delays stay, and the end is as good as the begin.
+    #[test]
+    fn a_tone_that_is_lost_leaves_the_delays() {
+        let mut channels = recordings(24_000);
+        channels[1][6144..8192].fill(f64::NAN);
+        let (samples, _, blocks) = fused(&channels, 24_000);
+        assert_eq!(blocks, [11, 1]);
+        let found = snr(&samples, 20_000..24_000);
+        assert!(found > 50.0, "{found}");
+    }
+}
