@@ -1,6 +1,6 @@
 //! Samples in memory, frame after frame or channel after channel.
 
-use super::{FrameSink, FrameSource, Halves, MOST_ROWS, SplitOutput, convert, interleave_rows};
+use super::{FrameSink, FrameSource, Halves, SplitOutput, convert};
 use crate::sample::same_mut;
 use crate::{Isa, ProcessError, Sample};
 use std::ops::Range;
@@ -106,12 +106,11 @@ impl<'a, S: Sample> Planar<'a, S> {
         }
     }
 
-    /// Frames sample by sample.
     fn load_each<T: Sample>(&self, first: usize, samples: &mut [T]) {
-        for (k, frame) in (first..).zip(samples.chunks_exact_mut(self.channels.len())) {
-            for (slot, channel) in frame.iter_mut().zip(self.channels) {
-                *slot = T::from_f64(channel[k].to_f64());
-            }
+        let n = self.channels.len();
+        for (i, channel) in self.channels.iter().enumerate() {
+            let slots = samples.iter_mut().skip(i).step_by(n);
+            slots.zip(&channel[first..]).for_each(|(slot, x)| *slot = T::from_f64(x.to_f64()));
         }
     }
 }
@@ -125,14 +124,8 @@ impl<S: Sample> FrameSource for Planar<'_, S> {
         self.frames
     }
 
-    fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {
-        let n = self.channels.len();
-        if n > MOST_ROWS {
-            return self.load_each(first, samples);
-        }
-        interleave_rows(isa, n, samples, |i, start, row| {
-            convert(&self.channels[i][first + start..][..row.len()], row);
-        });
+    fn load_f32(&self, _: Isa, first: usize, samples: &mut [f32]) {
+        self.load_each(first, samples);
     }
 
     fn load_f64(&self, _: Isa, first: usize, samples: &mut [f64]) {

@@ -160,27 +160,6 @@ fn convert<S: Sample, T: Sample>(from: &[S], to: &mut [T]) {
     }
 }
 
-/// Frames of f32 from rows, a row for each of N <= 128 channels: `row(i, k, samples)` copies samples of
-/// channel i from frame k on.
-fn interleave_rows(isa: Isa, n: usize, samples: &mut [f32], row: impl Fn(usize, usize, &mut [f32])) {
-    let frames = samples.len() / n;
-    let mut rows = [0f32; SCRATCH];
-    let step = SCRATCH / n / 8 * 8;
-    for start in (0..frames).step_by(step) {
-        let count = step.min(frames - start);
-        for (i, slots) in rows.chunks_exact_mut(step).take(n).enumerate() {
-            row(i, start, &mut slots[..count]);
-        }
-        let out = &mut samples[start * n..(start + count) * n];
-        for k in crate::simd::interleave(isa, &rows, step, n, count, out)..count {
-            (0..n).for_each(|i| out[k * n + i] = rows[i * step + k]);
-        }
-    }
-}
-
-/// Most channels that [`interleave_rows`] takes: 8 samples of each fit its rows.
-const MOST_ROWS: usize = SCRATCH / 8;
-
 /// The frames of a range of another input, where they lie.
 #[derive(Clone)]
 pub struct Frames<'a> {

@@ -125,7 +125,7 @@ unsafe fn remainder<T: SimdElement>(group: &PhaseGroup<T>, job: &FirJob<'_, T>, 
 /// M phases in groups of 4, before them one of 3 if M is odd, after them one of 2 if that is not enough,
 /// and a single phase only for M = 1. A group of 3 may write to the place after it, and the next group
 /// then writes over that.
-pub(crate) fn widths(phases: usize) -> impl Iterator<Item = (usize, usize)> {
+fn widths(phases: usize) -> impl Iterator<Item = (usize, usize)> {
     let mut first = 0;
     std::iter::from_fn(move || {
         let width = match phases - first {
