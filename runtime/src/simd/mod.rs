@@ -13,7 +13,7 @@
 //! Each kernel is one body that is generic over the vector type, compiled once for each instruction set.
 //! `unsafe` is needed for four things only: to call such a function after the processor was asked, to load
 //! and store vectors at addresses whose bounds the safe wrapper has checked once for the whole call, for
-//! two hints to the compiler in assembly, and to set the mode of denormals.
+//! one hint to the compiler in assembly, and to set the mode of denormals.
 //!
 //! What an unsafe function asks for is said at the function, its trait or the head of its file, and not
 //! again in its body. There are two preconditions. *The set is there*: a function that is generic over a

@@ -11,7 +11,6 @@
 //! frames and coefficients of the job, and write outputs of these frames and to the scratch: memory whose
 //! bounds `Polyphase::run` asserts for whole vectors of frames.
 
-use super::super::dispatch::keep_branch;
 use super::super::vector::Vector;
 use super::tiling::{FirJob, FrameChunk, sized, tile_size};
 
@@ -22,7 +21,7 @@ pub(super) struct Phases<'a, V: Vector, const D: usize, const P: usize> {
     /// The tile in scratch: its first frame and its vectors, 0 if there is none.
     first: usize,
     waiting: usize,
-    /// Of the sums that are checked, lane by lane: not finite if one of them is not.
+    /// Of the sums of the first phase, lane by lane: not finite if one of them is not.
     total: V,
 }
 
@@ -109,25 +108,9 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     }
 
     /// Remembers whether inputs are finite: they reach the sums of every phase, whatever the coefficients.
-    // Indices, because iterators of this many kernels are most of what is compiled here.
-    #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn check<const R: usize>(&mut self, sums: &[V; R]) {
-        let checked = self.job.tiling.checked;
-        // Long filters are asked once a tile, short ones about every vector.
-        if checked == !0 {
-            for r in 0..R - 1 {
-                self.total = self.total.add(sums[r]);
-            }
-        } else if checked & const { (1 << (R - 1)) - 1 } != 0 {
-            for r in 0..R - 1 {
-                if checked >> r & 1 == 1 {
-                    keep_branch();
-                    self.total = self.total.add(sums[r]);
-                }
-            }
-        }
-        self.total = self.total.add(sums[R - 1]);
+        sums.iter().for_each(|sum| self.total = self.total.add(*sum));
     }
 
     /// The sums of a tile to their places in the output, in the order of frames.
