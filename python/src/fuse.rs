@@ -142,7 +142,7 @@ fn filtered<'py>(
     Ok(FusedArray {
         // A frame may hold several samples of a converter.
         outcome: Outcome { clipped: room.clipped, channels: bank.channel_count(), ..outcome },
-        peak: room.peak(),
+        peak: room.peak(frames * bank.ratio * parts.len()),
         odd: odd_of(&decoders),
         is_clipped: decoders.iter().any(|decoder| decoder.faults().any(|fault| fault.is_clipping())),
         y: array.finish()?,

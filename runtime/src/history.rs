@@ -54,7 +54,6 @@ impl<T: Sample> History<T> {
     }
 
     /// The history is the end of `samples`, which are at least as long.
-    #[cfg(feature = "rayon")]
     pub(crate) fn load(&mut self, samples: &[T]) {
         self.samples[..self.len].copy_from_slice(&samples[samples.len() - self.len..]);
         self.next = self.len;

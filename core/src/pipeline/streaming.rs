@@ -131,7 +131,7 @@ impl<'a> Pipeline<'a> {
             let mut output = room(&mut self.buffer, self.format, frames * self.fusion.outputs());
             let written = self.fusion.flush(frames, most, &mut output)?;
             self.clipped += output.clipped;
-            self.peak = self.peak.max(output.peak());
+            self.peak = self.peak.max(output.peak(written * self.fusion.parts()));
             self.written(written, write)?;
         }
         Ok(())
@@ -163,7 +163,7 @@ impl<'a> Pipeline<'a> {
         let mut output = room(&mut self.buffer, self.format, frames * self.fusion.outputs());
         let written = self.fusion.step(parts, usize::MAX, &mut output)?;
         self.clipped += output.clipped;
-        self.peak = self.peak.max(output.peak());
+        self.peak = self.peak.max(output.peak(written * self.fusion.parts()));
         self.written(written, write)
     }
 

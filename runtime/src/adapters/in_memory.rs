@@ -1,7 +1,9 @@
 //! Samples in memory, frame after frame or channel after channel.
 
 use super::{FrameSink, FrameSource, Halves, SplitOutput, convert};
+use crate::sample::same_mut;
 use crate::{Isa, ProcessError, Sample};
+use std::ops::Range;
 
 /// Frames of N samples one after another: sample of channel i in frame k at k N + i.
 #[derive(Debug, Clone, Copy)]
@@ -56,6 +58,14 @@ impl<S: Sample> FrameSource for Interleaved<'_, S> {
 impl<S: Sample> FrameSink for &mut [S] {
     fn capacity(&self) -> usize {
         self.len()
+    }
+
+    fn slots_f32(&mut self, samples: Range<usize>) -> Option<&mut [f32]> {
+        same_mut(&mut self[samples])
+    }
+
+    fn slots_f64(&mut self, samples: Range<usize>) -> Option<&mut [f64]> {
+        same_mut(&mut self[samples])
     }
 
     fn store_f32(&mut self, _: Isa, first: usize, samples: &[f32]) {

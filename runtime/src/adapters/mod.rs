@@ -48,6 +48,17 @@ pub trait FrameSink: Send {
     /// samples has part 0 only.
     fn select(&mut self, _part: usize) {}
 
+    /// Room for the samples of a range, if samples lie one after another in memory as f32. The kernels write
+    /// them there; some may be written more than once.
+    fn slots_f32(&mut self, _samples: Range<usize>) -> Option<&mut [f32]> {
+        None
+    }
+
+    /// As [`FrameSink::slots_f32`].
+    fn slots_f64(&mut self, _samples: Range<usize>) -> Option<&mut [f64]> {
+        None
+    }
+
     /// Stores samples from sample `first` on. `isa` is the instruction set for conversions.
     fn store_f32(&mut self, isa: Isa, first: usize, samples: &[f32]);
 
@@ -79,6 +90,14 @@ impl dyn FrameSource + '_ {
 
 /// By number type.
 impl dyn FrameSink + '_ {
+    pub(crate) fn slots<T: Sample>(&mut self, samples: Range<usize>) -> Option<&mut [T]> {
+        if size_of::<T>() == 4 {
+            self.slots_f32(samples).and_then(same_mut)
+        } else {
+            self.slots_f64(samples).and_then(same_mut)
+        }
+    }
+
     /// [`FrameSink::store_f32`] or [`FrameSink::store_f64`].
     pub fn store<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]) {
         if let Some(samples) = same(samples) {

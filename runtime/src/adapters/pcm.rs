@@ -4,6 +4,7 @@ use super::{FrameSink, FrameSource, Halves, SplitOutput};
 use crate::pcm::peak;
 use crate::simd::{decode, encode};
 use crate::{Isa, PcmFormat, PcmFrames, Sample, SampleLayout};
+use std::ops::Range;
 
 /// Room for output samples as they lie in files and pipes. Those beyond the full scale of an integer format
 /// saturate.
@@ -15,7 +16,8 @@ pub struct PcmOutput<'a> {
     pub bytes: &'a mut [u8],
     /// Samples that were clipped, added to by every call.
     pub clipped: u64,
-    peak: f64,
+    /// The largest magnitude of the samples that were encoded.
+    encoded_peak: f64,
     /// The part of complex samples that is stored, see [`FrameSink::select`].
     part: Option<usize>,
 }
@@ -23,16 +25,32 @@ pub struct PcmOutput<'a> {
 impl<'a> PcmOutput<'a> {
     /// Room for samples that lie close together, none of them clipped so far.
     pub fn packed(format: PcmFormat, bytes: &'a mut [u8]) -> Self {
-        Self { layout: SampleLayout::packed(format), bytes, clipped: 0, peak: 0.0, part: None }
+        Self { layout: SampleLayout::packed(format), bytes, clipped: 0, encoded_peak: 0.0, part: None }
     }
 
-    /// The largest magnitude, of full scale, of the samples, as they were before they saturated.
-    pub fn peak(&self) -> f64 {
-        self.peak
+    /// The largest magnitude, of full scale, of the first `samples` numbers, as they were before they
+    /// saturated.
+    pub fn peak(&self, samples: usize) -> f64 {
+        let size = self.layout.format.bytes();
+        let written = &self.bytes[..(samples * size).min(self.bytes.len())];
+        if is_native::<f32>(self.layout) {
+            return bytemuck::try_cast_slice(written).map_or(self.encoded_peak, peak::<f32>);
+        }
+        if is_native::<f64>(self.layout) {
+            return bytemuck::try_cast_slice(written).map_or(self.encoded_peak, peak::<f64>);
+        }
+        self.encoded_peak
+    }
+
+    /// Room for samples that lie in memory as numbers do. Parts of complex samples lie apart.
+    fn slots_as<T: Sample>(&mut self, samples: Range<usize>) -> Option<&mut [T]> {
+        let is_native = is_native::<T>(self.selected().0);
+        let numbers = is_native.then(|| bytemuck::try_cast_slice_mut(self.bytes).ok());
+        numbers.flatten().map(|numbers| &mut numbers[samples])
     }
 
     fn store_as<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]) {
-        self.peak = self.peak.max(peak(samples));
+        self.encoded_peak = self.encoded_peak.max(peak(samples));
         let (SampleLayout { format, container }, before) = self.selected();
         let out = &mut self.bytes[before + first * container..];
         self.clipped += match container == format.bytes() {
@@ -48,6 +66,12 @@ impl<'a> PcmOutput<'a> {
     fn selected(&self) -> (SampleLayout, usize) {
         self.part.map_or((self.layout, 0), |part| (self.layout.part(), part * self.layout.container))
     }
+}
+
+/// Whether samples of a layout lie in memory as numbers of type `T` do.
+fn is_native<T: Sample>(layout: SampleLayout) -> bool {
+    let format = if size_of::<T>() == 4 { PcmFormat::F32Le } else { PcmFormat::F64Le };
+    layout == SampleLayout::packed(format.native())
 }
 
 impl FrameSource for PcmFrames<'_> {
@@ -92,6 +116,14 @@ impl FrameSink for PcmOutput<'_> {
         self.part = Some(part);
     }
 
+    fn slots_f32(&mut self, samples: Range<usize>) -> Option<&mut [f32]> {
+        self.slots_as(samples)
+    }
+
+    fn slots_f64(&mut self, samples: Range<usize>) -> Option<&mut [f64]> {
+        self.slots_as(samples)
+    }
+
     fn store_f32(&mut self, isa: Isa, first: usize, samples: &[f32]) {
         self.store_as(isa, first, samples);
     }
@@ -105,10 +137,10 @@ impl SplitOutput for PcmOutput<'_> {
     fn halves(&mut self, samples: usize, with: Halves<'_>) {
         let (layout, part, size) = (self.layout, self.part, self.selected().0.container);
         let (earlier, later) = self.bytes.split_at_mut(samples * size);
-        let half = |bytes| PcmOutput { layout, bytes, clipped: 0, peak: 0.0, part };
+        let half = |bytes| PcmOutput { layout, bytes, clipped: 0, encoded_peak: 0.0, part };
         let (mut earlier, mut later) = (half(earlier), half(later));
         with(&mut earlier, &mut later);
         self.clipped += earlier.clipped + later.clipped;
-        self.peak = self.peak.max(earlier.peak).max(later.peak);
+        self.encoded_peak = self.encoded_peak.max(earlier.encoded_peak).max(later.encoded_peak);
     }
 }

@@ -40,8 +40,16 @@ pub(crate) struct Direct<T: Sample> {
 #[derive(Debug, Clone)]
 pub(crate) struct DirectState<T: Sample> {
     history: History<T>,
-    /// One block of output.
+    /// One block of output, for outputs of another type.
     output: Aligned<T>,
+}
+
+/// What was not finite in some frames.
+struct Lost {
+    /// Samples.
+    count: u64,
+    /// The frames whose windows hold them.
+    touched: Range<usize>,
 }
 
 impl<T: Sample> Direct<T> {
@@ -89,33 +97,43 @@ impl<T: Sample> Direct<T> {
         output: &mut dyn FrameSink,
     ) -> u64 {
         let DirectState { history, output: block } = state;
-        let len = frames.len();
+        let (len, samples) = (frames.len(), frames.start * self.ratio..frames.end * self.ratio);
         input.load(self.isa, frames.start, history.room(len));
-        // Filtered first: hardly ever is there anything to replace.
-        let replaced = match self.filters.run(history.view(), len, block) {
-            true => 0,
-            false => self.replace(history, len, block),
+        let mut filter = |out: &mut [T]| {
+            // Filtered first: hardly ever is there anything to replace.
+            if self.filters.run(history.view(), len, out) {
+                return 0;
+            }
+            let lost = self.replace(history, len);
+            self.filter_again(history, lost.touched, len, out);
+            lost.count
         };
-        output.store(self.isa, frames.start * self.ratio, &block[..len * self.ratio]);
+        let replaced = match output.slots(samples.clone()) {
+            Some(slots) => filter(slots),
+            None => {
+                let block = &mut block[..samples.len()];
+                let replaced = filter(block);
+                output.store(self.isa, samples.start, block);
+                replaced
+            }
+        };
         history.advance(len);
         replaced
     }
 
-    /// Zeros in place of what is not finite in the frames of the history's room, and the outputs of frames
-    /// whose windows hold it once more; returns how many samples it was.
-    fn replace(&self, history: &mut History<T>, frames: usize, out: &mut [T]) -> u64 {
+    /// Zeros in place of what is not finite in the frames of the history's room.
+    fn replace(&self, history: &mut History<T>, frames: usize) -> Lost {
         let Replaced { count, places } = replace_not_finite(self.isa, history.room(frames));
-        if count > 0 {
-            let (first, end) = (places.start / self.channels, places.end.div_ceil(self.channels));
-            let touched = frames.min(end + self.history_frames) - first;
-            let out = &mut out[first * self.ratio..];
-            // The place after them may belong to a frame that is not touched.
-            let after = self.filters.outputs(touched) - 1;
-            let kept = out[after];
-            self.filters.run(&history.view()[first * self.channels..], touched, out);
-            out[after] = kept;
-        }
-        count
+        let reach = if count > 0 { self.history_frames } else { 0 };
+        Lost { count, touched: places.start / self.channels..places.end.div_ceil(self.channels) + reach }
+    }
+
+    /// Filters `touched` of the `frames` frames in the history's room.
+    fn filter_again(&self, history: &History<T>, touched: Range<usize>, frames: usize, out: &mut [T]) {
+        // Whole vectors take least time.
+        let len = touched.len().next_multiple_of(self.filters.tiling.vector);
+        let x = &history.view()[touched.start * self.channels..];
+        self.filters.run(x, len.min(frames - touched.start), &mut out[touched.start * self.ratio..]);
     }
 
     /// A state before frame `first` of `input`, as if all frames before it had been processed: at least
@@ -150,7 +168,7 @@ impl<T: Sample> Filter for Direct<T> {
         let (n, &Tiling { history, vector, .. }) = (self.channels, &self.filters.tiling);
         DirectState {
             history: History::new(n, history, self.block * n, vector * n),
-            output: Aligned::new(self.filters.outputs(self.block + vector)),
+            output: Aligned::new(self.ratio * self.block),
         }
     }
 

@@ -1,5 +1,5 @@
 //! Streams through the public interface.
 
 mod allocations;
-mod formats;
+mod in_place;
 mod states;

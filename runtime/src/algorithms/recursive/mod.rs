@@ -148,8 +148,8 @@ impl Filter for Recursive {
             history: History::new(self.channels, tiling.history, BLOCK * self.channels, padding),
             rows: Aligned::new(rows),
             states,
-            output: Aligned::new(self.feedthrough.outputs(BLOCK)),
-            state_output: Aligned::new(self.output_matrix.outputs(BLOCK)),
+            output: Aligned::new(self.ratio * BLOCK),
+            state_output: Aligned::new(self.ratio * BLOCK),
             phase_offset: 0,
             resets: 0,
         }

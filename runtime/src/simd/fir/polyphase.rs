@@ -8,6 +8,9 @@ use super::kernel::{FirFn, FirKernel};
 use super::tiling::{FirJob, FrameChunk, SCRATCH, Tiling};
 use crate::aligned::Aligned;
 
+/// Samples of the outputs of one vector: 16 frames of 4 phases.
+const VECTOR_OUTPUTS: usize = 64;
+
 /// FIR filters from windows of frames to M phases.
 #[derive(Debug)]
 pub(crate) struct Polyphase<T: SimdElement> {
@@ -17,10 +20,12 @@ pub(crate) struct Polyphase<T: SimdElement> {
     groups: Vec<PhaseGroup<T>>,
 }
 
-/// One to four phases that are computed together, one only where there is no other.
+/// One to four phases that are computed together.
 #[derive(Debug)]
 struct PhaseGroup<T: SimdElement> {
     first: usize,
+    /// P; 1 only where there is no other phase.
+    width: usize,
     /// Coefficient of lane d in the step that comes s-th for the p-th sum ([`Tiling::phase`]) at
     /// (s P + p) D + d.
     coefficients: Aligned<T>,
@@ -42,21 +47,16 @@ impl<T: SimdElement> Polyphase<T> {
         assert!(tiling.steps > 0 && (tiling.depth == tiling.hop || tiling.depth == group_lanes::<T>()));
         let group = |(first, width)| PhaseGroup {
             first,
+            width,
             coefficients: coefficients(&tiling, first, width, &coefficient),
             kernel: kernel.function(tiling.depth, width),
         };
         Self { tiling, ratio, groups: widths(ratio).map(group).collect() }
     }
 
-    /// Room for the outputs of so many frames, up to whole vectors, and the place after them, to which the
-    /// kernels of three phases write too.
-    pub(crate) fn outputs(&self, frames: usize) -> usize {
-        frames.next_multiple_of(self.tiling.vector) * self.ratio + 1
-    }
-
     /// Phase p of frame t of `frames` goes to `out[t M + p]`. The t-th frame begins at
-    /// `x[tiling.history + t * tiling.hop]`; frames past the last one, up to whole vectors, are read too,
-    /// and what is written for them and to the place after them means nothing.
+    /// `x[tiling.history + t * tiling.hop]`; frames past the last one, up to whole vectors, are read too and
+    /// mean nothing.
     ///
     /// Returns false if an input of these frames is not finite: it makes all outputs of its frame so,
     /// whatever the coefficients. It is false also where finite inputs led to sums, or to a total of sums,
@@ -66,15 +66,16 @@ impl<T: SimdElement> Polyphase<T> {
     /// If `x` or `out` is too short for that.
     pub(crate) fn run(&self, x: &[T], frames: usize, out: &mut [T]) -> bool {
         let Tiling { history, hop, depth, vector, .. } = self.tiling;
-        let padded = frames.next_multiple_of(vector);
-        assert!(history + padded * hop <= x.len() && self.outputs(frames) <= out.len());
+        let padded = (frames + vector - 1) & !(vector - 1);
+        assert!(history + padded * hop <= x.len() && frames * self.ratio <= out.len());
         #[cfg(test)]
         work::add(frames * self.tiling.steps * depth * self.ratio);
-        // All outputs are written through this one pointer.
+        // All outputs are written through this one pointer, here and in the kernels. Of three phases the
+        // kernels write to the place after them too, so the last frame is left to `remainder`.
         let chunk = FrameChunk {
             x: x.as_ptr().wrapping_add(history + hop - depth),
             out: out.as_mut_ptr(),
-            frames: padded,
+            frames: frames.saturating_sub(usize::from(self.ratio == 3)) & !(vector - 1),
         };
         let mut scratch = std::mem::MaybeUninit::<Scratch<T>>::uninit();
         let mut finite = true;
@@ -89,10 +90,36 @@ impl<T: SimdElement> Polyphase<T> {
             };
             // SAFETY: the coefficients were made for the kernel and the tiling, and all loads and stores lie
             // within the bounds that are asserted above.
-            finite &= unsafe { (group.kernel)(&job) };
+            finite &= unsafe { (group.kernel)(&job) & remainder(group, &job, frames - chunk.frames) };
         }
         finite
     }
+}
+
+/// The frames, a vector at most, that are `left` of a chunk: all outputs of the vector go to scratch, and
+/// those that are wanted from there.
+///
+/// # Safety
+/// The job is that of a checked call.
+unsafe fn remainder<T: SimdElement>(group: &PhaseGroup<T>, job: &FirJob<'_, T>, left: usize) -> bool {
+    if left == 0 {
+        return true;
+    }
+    let FrameChunk { x, out, frames } = job.chunk;
+    let mut outputs = [T::default(); VECTOR_OUTPUTS];
+    let hop = group.width.next_power_of_two();
+    let chunk = FrameChunk {
+        x: x.wrapping_add(frames * job.tiling.hop),
+        out: outputs.as_mut_ptr(),
+        frames: job.tiling.vector,
+    };
+    // A vector has at most 16 frames, so the scratch holds them.
+    let finite = (group.kernel)(&FirJob { chunk, first: 0, out_hop: hop, ..*job });
+    for (t, phases) in outputs.chunks_exact(hop).enumerate().take(left) {
+        let frame = out.add((frames + t) * job.out_hop);
+        frame.add(group.first).copy_from_nonoverlapping(phases.as_ptr(), group.width);
+    }
+    finite
 }
 
 /// M phases in groups of 4, before them one of 3 if M is odd, after them one of 2 if that is not enough,
