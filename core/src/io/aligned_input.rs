@@ -45,7 +45,7 @@ impl AlignedInput {
     /// Sets the lost frames; to be called before the first frame is used.
     pub(super) fn lose(&mut self, breaks: VecDeque<Break>, lost: LostInInput) {
         self.breaks = breaks;
-        self.dropouts = Dropouts::new(lost.dropouts, self.header.channels);
+        self.dropouts.ahead = lost.dropouts.into();
     }
 
     /// The break at the next frame.
@@ -100,14 +100,13 @@ impl AlignedInput {
         !self.breaks.is_empty()
     }
 
-    /// Frames that are at hand and alike.
+    /// Frames that are at hand, either lost or not.
     pub(super) fn ready(&self) -> usize {
-        let change = clamp(self.dropouts.until_change());
         if let Some(Break { lost, .. }) = self.at_break() {
-            return clamp(lost).min(LOST_FRAMES).min(change);
+            return clamp(lost).min(LOST_FRAMES);
         }
         let until_break = self.breaks.front().map_or(usize::MAX, |next| clamp(next.frame - self.frames));
-        self.left().min(until_break).min(change)
+        self.left().min(until_break)
     }
 
     /// Makes `frames` frames visible: at most those that are ready, or any number once the input is over.
@@ -116,10 +115,8 @@ impl AlignedInput {
             if self.lost.frames() < frames {
                 self.lost = Block::missing(&self.header, frames.max(LOST_FRAMES));
             }
-        } else if self.dropouts.any() {
-            let (dropouts, block) = (&self.dropouts, &mut self.block);
-            let invalid = (0..self.header.channels).filter(|channel| dropouts.covers(*channel));
-            invalid.for_each(|channel| block.lose(channel, self.used..self.used + frames));
+        } else {
+            self.dropouts.mark(&mut self.block, self.used, frames);
         }
     }
 
@@ -142,7 +139,7 @@ impl AlignedInput {
     /// Advances by `frames` frames.
     pub(super) fn advance(&mut self, frames: usize) {
         let (is_break, is_over) = (self.at_break().is_some(), self.is_over());
-        self.dropouts.advance(frames as u64);
+        self.dropouts.advance(frames);
         if is_break {
             self.breaks.front_mut().into_iter().for_each(|next| next.lost -= frames as u64);
         } else if !is_over {
@@ -160,72 +157,40 @@ fn clamp(count: u64) -> usize {
 }
 
 /// The dropouts of an input, seen from the current frame.
-///
-/// Each channel needs only the frame at which its validity returns, so overlapping dropouts cost no more
-/// than others: a dropout that begins while its channel is invalid moves that frame.
 #[derive(Debug, Default)]
 struct Dropouts {
     /// The current frame.
     time: u64,
-    /// Dropouts that lie ahead, in the order of their first frames.
+    /// Those that begin later, in the order of their first frames.
     ahead: VecDeque<Dropout>,
-    /// Each channel is invalid before this frame.
-    channels: Vec<u64>,
-    /// All channels are invalid before this frame.
-    all: u64,
-    /// The least of these frames that lies after the current one.
-    next_end: Option<u64>,
+    /// Those that have begun and not ended.
+    begun: Vec<Dropout>,
 }
 
 impl Dropouts {
-    /// Dropouts in the order of their first frames, for so many channels.
-    fn new(ahead: Vec<Dropout>, channels: usize) -> Self {
-        let mut dropouts = Self { ahead: ahead.into(), channels: vec![0; channels], ..Self::default() };
-        dropouts.enter();
-        dropouts
-    }
-
-    /// True if a channel is invalid at the current frame.
-    fn any(&self) -> bool {
-        self.next_end.is_some()
-    }
-
-    /// True if this channel is invalid at the current frame.
-    fn covers(&self, channel: usize) -> bool {
-        self.all.max(self.channels[channel]) > self.time
-    }
-
-    /// Frames from the current one on in which the same channels are invalid.
-    fn until_change(&self) -> u64 {
-        let next = self.ahead.front().map(|dropout| dropout.frames.start);
-        self.next_end.into_iter().chain(next).min().map_or(u64::MAX, |frame| frame - self.time)
-    }
-
-    /// Goes on by `frames` frames, at most to the next change.
-    fn advance(&mut self, frames: u64) {
-        let change = frames >= self.until_change();
-        self.time += frames;
-        if change {
-            self.enter();
-        }
-    }
-
-    /// Takes the dropouts that begin now, and those that begin while their channels are invalid anyway.
-    fn enter(&mut self) {
-        let time = self.time;
-        while let Some(dropout) = self.ahead.front() {
-            let end = match dropout.channel {
-                Some(channel) => &mut self.channels[channel],
-                None => &mut self.all,
-            };
-            if dropout.frames.start > time && (*end <= time || dropout.frames.start > *end) {
-                break;
+    /// Marks what is invalid of the next frames, which lie in `block` from frame `first` on.
+    fn mark(&mut self, block: &mut Block, first: usize, frames: usize) {
+        let end = self.time + frames as u64;
+        while let Some(next) = self.ahead.front().filter(|next| next.frames.start < end) {
+            // Many that overlap cost no more than one.
+            match self.begun.iter_mut().rfind(|other| other.channel == next.channel) {
+                Some(other) if other.frames.end >= next.frames.start => {
+                    other.frames.end = next.frames.end.max(other.frames.end);
+                }
+                _ => self.begun.push(next.clone()),
             }
-            *end = dropout.frames.end.max(*end);
             self.ahead.pop_front();
         }
-        let ends = self.channels.iter().copied().chain([self.all]);
-        self.next_end = ends.filter(|&end| end > time).min();
+        for Dropout { channel, frames } in &self.begun {
+            let place = |time: u64| first + (time.clamp(self.time, end) - self.time) as usize;
+            let channels = channel.map_or(0..block.channels(), |channel| channel..channel + 1);
+            channels.for_each(|channel| block.lose(channel, place(frames.start)..place(frames.end)));
+        }
+    }
+
+    fn advance(&mut self, frames: usize) {
+        self.time += frames as u64;
+        self.begun.retain(|dropout| dropout.frames.end > self.time);
     }
 }
 

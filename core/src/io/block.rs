@@ -6,7 +6,6 @@
 use super::{StreamHeader, TimeInterleaving};
 use crate::runtime::{FrameSource, Interleaved, Isa, PcmFrames, Precision, Sample, SampleLayout};
 use std::collections::TryReserveError;
-use std::io;
 use std::ops::Range;
 
 /// Numbers of one kind.
@@ -96,23 +95,6 @@ impl Block {
         self.parts.iter_mut().enumerate().try_for_each(|(k, part)| append(&frames.part(k), part))
     }
 
-    /// Lets `read` put frames where their numbers are to lie, in a room of `bytes` bytes, and say how many
-    /// bytes these have. False, without a call, where samples are stored otherwise than in memory.
-    pub(super) fn read_native(
-        &mut self,
-        header: &StreamHeader,
-        bytes: usize,
-        read: impl FnOnce(&mut [u8]) -> io::Result<usize>,
-    ) -> io::Result<bool> {
-        let format = header.layout.format;
-        let is_native = format.is_float() && format.native() == format && format.bytes() > 2;
-        match &mut self.parts[..] {
-            [Numbers::F32(numbers)] if is_native => read_into(numbers, bytes, read).map(|()| true),
-            [Numbers::F64(numbers)] if is_native => read_into(numbers, bytes, read).map(|()| true),
-            _ => Ok(false),
-        }
-    }
-
     /// Appends frames of numbers; those of the parts of complex samples take turns.
     pub(super) fn extend(&mut self, more: impl IntoIterator<Item = f64>) {
         let parts = self.parts.len().max(1);
@@ -194,20 +176,6 @@ impl Block {
     }
 }
 
-/// Appends the numbers whose bytes `read` puts in a room of `bytes` bytes.
-fn read_into<T: Sample + bytemuck::Pod>(
-    numbers: &mut Vec<T>,
-    bytes: usize,
-    read: impl FnOnce(&mut [u8]) -> io::Result<usize>,
-) -> io::Result<()> {
-    let (begin, more) = (numbers.len(), bytes / size_of::<T>());
-    numbers.try_reserve(more).map_err(|_| io::ErrorKind::OutOfMemory)?;
-    numbers.resize(begin + more, T::from_f64(0.0));
-    let filled = read(bytemuck::cast_slice_mut(&mut numbers[begin..]));
-    numbers.truncate(begin + filled.as_ref().unwrap_or(&0) / size_of::<T>());
-    filled.map(drop)
-}
-
 /// Appends the samples of frames.
 fn append(frames: &PcmFrames<'_>, to: &mut Numbers) -> Result<(), TryReserveError> {
     let (begin, more) = (to.len(), frames.frames() * frames.channels);
@@ -276,18 +244,6 @@ impl FrameSource for NumberFrames<'_> {
 
     fn frames(&self) -> usize {
         self.input().frames()
-    }
-
-    fn in_memory_f32(&self) -> Option<&[f32]> {
-        self.input().in_memory_f32()
-    }
-
-    fn in_memory_f64(&self) -> Option<&[f64]> {
-        self.input().in_memory_f64()
-    }
-
-    fn is_finite(&self, frames: Range<usize>) -> bool {
-        self.input().is_finite(frames)
     }
 
     fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {

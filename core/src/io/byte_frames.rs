@@ -64,15 +64,12 @@ impl<R: ByteSource> Capture for ByteFrames<R> {
     fn read_block(&mut self, bytes: usize, block: &mut Block) -> io::Result<bool> {
         let Self { frames, header, bytes: buffer } = self;
         let room = bytes.max(frames.frame);
-        if !block.read_native(header, room, |bytes| frames.read_some(bytes))? {
-            let memory = buffer.try_reserve(room.saturating_sub(buffer.len()));
-            memory.map_err(|_| io::ErrorKind::OutOfMemory)?;
-            buffer.resize(room, 0);
-            let filled = frames.read_some(buffer)?;
-            let stored =
-                PcmFrames { layout: header.layout, channels: header.columns(), bytes: &buffer[..filled] };
-            block.decode(&stored).map_err(|_| io::ErrorKind::OutOfMemory)?;
-        }
+        let memory = |_| io::ErrorKind::OutOfMemory;
+        buffer.try_reserve(room.saturating_sub(buffer.len())).map_err(memory)?;
+        buffer.resize(room, 0);
+        let filled = frames.read_some(buffer)?;
+        let (layout, bytes) = (header.layout, &buffer[..filled]);
+        block.decode(&PcmFrames { layout, channels: header.columns(), bytes }).map_err(memory)?;
         Ok(!frames.ended)
     }
 

@@ -2,7 +2,7 @@
 
 use super::fusion::Fusion;
 use super::{Outcome, PipelineError, Settings};
-use crate::bank::{Bank, SynthesisFilters};
+use crate::bank::Bank;
 use crate::runtime::{
     FrameSource, Frames, Options, Plan, Planar, Precision, ProcessError, SplitOutput, ThreadPool,
 };
@@ -11,12 +11,8 @@ use crate::runtime::{
 /// without a signal.
 const COPIED_SAMPLES: usize = 1 << 17;
 
-/// Multiply-adds of a step on one thread: from 2 ms with AVX-512 to 100 ms with double sums on a slow
-/// processor.
-const STEP_MULTIPLY_ADDS: usize = 1 << 27;
-
-/// Reading, converting and storing an output sample cost about as much as so many multiply-adds.
-const MULTIPLY_ADDS_PER_STORE: usize = 8;
+/// Output samples of a step on one thread otherwise.
+const STEP_SAMPLES: usize = 1 << 18;
 
 /// Fuses a signal in memory: M output samples for each of its frames.
 ///
@@ -28,8 +24,7 @@ const MULTIPLY_ADDS_PER_STORE: usize = 8;
 ///
 /// `parts` is one input of real samples, or the real and the imaginary parts of complex ones; then
 /// [`FrameSink::select`](crate::runtime::FrameSink::select) says which of them `output` stores. `stop` is
-/// called every few milliseconds of work, on the thread of the caller, and ends the fusion if it returns
-/// true.
+/// called several times a second, on the thread of the caller, and ends the fusion if it returns true.
 ///
 /// # Errors
 /// [`PipelineError::Process`] if the channels do not match the bank or the output is too short, and
@@ -48,7 +43,7 @@ pub fn fuse(
         output.select(0);
     }
     check(plan, parts, output.capacity(), wanted)?;
-    let most = step(bank, plan, &settings);
+    let most = step(plan, &settings);
     let has_mask = settings.gaps.is_some();
     let mut fusion = Fusion::new(bank, plan, parts.len(), settings);
     let mut mask = Vec::new();
@@ -116,30 +111,17 @@ fn check(
 }
 
 /// Frames of a step, a multiple of the plan's alignment unless gaps are filled.
-fn step(bank: &Bank, plan: &Plan, settings: &Settings<'_>) -> usize {
+fn step(plan: &Plan, settings: &Settings<'_>) -> usize {
     let threads = settings.workers.map_or(1, ThreadPool::threads);
-    let each = multiply_adds_per_frame(bank, plan) + plan.ratio() * MULTIPLY_ADDS_PER_STORE;
-    let most = (threads * STEP_MULTIPLY_ADDS / each).max(1).next_multiple_of(plan.alignment());
     match &settings.gaps {
-        Some(_) => copied_frames(plan).min(most),
-        None => most,
+        Some(_) => copied_frames(plan),
+        None => (threads * STEP_SAMPLES / plan.ratio()).max(1).next_multiple_of(plan.alignment()),
     }
 }
 
 /// Frames of a step that are copied, at most.
 fn copied_frames(plan: &Plan) -> usize {
     (COPIED_SAMPLES / plan.channels()).max(1)
-}
-
-/// Multiply-adds of a frame, at most.
-fn multiply_adds_per_frame(bank: &Bank, plan: &Plan) -> usize {
-    let (channels, ratio) = (plan.channels(), plan.ratio());
-    match (&bank.filters, plan.summary().multiply_adds) {
-        (SynthesisFilters::StateSpace(system), None) => {
-            (system.a.len() + ratio) * (system.a.len() + channels)
-        }
-        (_, each) => each.unwrap_or_default().ceil() as usize * ratio,
-    }
 }
 
 #[cfg(test)]

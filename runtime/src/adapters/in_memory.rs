@@ -1,7 +1,7 @@
 //! Samples in memory, frame after frame or channel after channel.
 
-use super::{FrameSink, FrameSource, Halves, MOST_ROWS, SplitOutput, convert, interleave_rows};
-use crate::sample::{same, same_mut};
+use super::{FrameSink, FrameSource, Halves, SplitOutput, convert};
+use crate::sample::same_mut;
 use crate::{Isa, ProcessError, Sample};
 use std::ops::Range;
 
@@ -44,19 +44,6 @@ impl<S: Sample> FrameSource for Interleaved<'_, S> {
 
     fn frames(&self) -> usize {
         self.frames
-    }
-
-    fn in_memory_f32(&self) -> Option<&[f32]> {
-        same(self.samples)
-    }
-
-    fn in_memory_f64(&self) -> Option<&[f64]> {
-        same(self.samples)
-    }
-
-    fn is_finite(&self, frames: Range<usize>) -> bool {
-        let samples = &self.samples[frames.start * self.channels..frames.end * self.channels];
-        samples.iter().all(|sample| sample.to_f64().is_finite())
     }
 
     fn load_f32(&self, _: Isa, first: usize, samples: &mut [f32]) {
@@ -119,17 +106,11 @@ impl<'a, S: Sample> Planar<'a, S> {
         }
     }
 
-    /// One channel is interleaved as it lies.
-    fn alone(&self) -> Option<&[S]> {
-        if let [alone] = self.channels { Some(alone) } else { None }
-    }
-
-    /// Frames sample by sample.
     fn load_each<T: Sample>(&self, first: usize, samples: &mut [T]) {
-        for (k, frame) in (first..).zip(samples.chunks_exact_mut(self.channels.len())) {
-            for (slot, channel) in frame.iter_mut().zip(self.channels) {
-                *slot = T::from_f64(channel[k].to_f64());
-            }
+        let n = self.channels.len();
+        for (i, channel) in self.channels.iter().enumerate() {
+            let slots = samples.iter_mut().skip(i).step_by(n);
+            slots.zip(&channel[first..]).for_each(|(slot, x)| *slot = T::from_f64(x.to_f64()));
         }
     }
 }
@@ -143,28 +124,8 @@ impl<S: Sample> FrameSource for Planar<'_, S> {
         self.frames
     }
 
-    fn in_memory_f32(&self) -> Option<&[f32]> {
-        self.alone().and_then(same)
-    }
-
-    fn in_memory_f64(&self) -> Option<&[f64]> {
-        self.alone().and_then(same)
-    }
-
-    fn is_finite(&self, frames: Range<usize>) -> bool {
-        self.channels
-            .iter()
-            .all(|channel| channel[frames.clone()].iter().all(|sample| sample.to_f64().is_finite()))
-    }
-
-    fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {
-        let n = self.channels.len();
-        if n > MOST_ROWS {
-            return self.load_each(first, samples);
-        }
-        interleave_rows(isa, n, samples, |i, start, row| {
-            convert(&self.channels[i][first + start..][..row.len()], row);
-        });
+    fn load_f32(&self, _: Isa, first: usize, samples: &mut [f32]) {
+        self.load_each(first, samples);
     }
 
     fn load_f64(&self, _: Isa, first: usize, samples: &mut [f64]) {

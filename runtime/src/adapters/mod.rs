@@ -30,21 +30,6 @@ pub trait FrameSource: Sync {
     /// Frames of the call.
     fn frames(&self) -> usize;
 
-    /// All samples, frame after frame, if they lie so in memory as f32. The kernels read them there.
-    fn in_memory_f32(&self) -> Option<&[f32]> {
-        None
-    }
-
-    /// As [`FrameSource::in_memory_f32`].
-    fn in_memory_f64(&self) -> Option<&[f64]> {
-        None
-    }
-
-    /// True if no sample of some frames is NaN or infinite; false where that is not looked at.
-    fn is_finite(&self, _frames: Range<usize>) -> bool {
-        false
-    }
-
     /// Copies frames from frame `first` on to `samples`, frame after frame: `samples.len() / N` frames, all
     /// of which are there. NaN and infinity are copied as they are. `isa` is the instruction set for
     /// conversions.
@@ -92,10 +77,6 @@ pub type Halves<'w> = &'w mut dyn FnMut(&mut dyn SplitOutput, &mut dyn SplitOutp
 
 /// By number type.
 impl dyn FrameSource + '_ {
-    pub(crate) fn in_memory<T: Sample>(&self) -> Option<&[T]> {
-        self.in_memory_f32().and_then(same).or_else(|| self.in_memory_f64().and_then(same))
-    }
-
     /// [`FrameSource::load_f32`] or [`FrameSource::load_f64`].
     pub fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
         if let Some(samples) = same_mut(samples) {
@@ -179,27 +160,6 @@ fn convert<S: Sample, T: Sample>(from: &[S], to: &mut [T]) {
     }
 }
 
-/// Frames of f32 from rows, a row for each of N <= 128 channels: `row(i, k, samples)` copies samples of
-/// channel i from frame k on.
-fn interleave_rows(isa: Isa, n: usize, samples: &mut [f32], row: impl Fn(usize, usize, &mut [f32])) {
-    let frames = samples.len() / n;
-    let mut rows = [0f32; SCRATCH];
-    let step = SCRATCH / n / 8 * 8;
-    for start in (0..frames).step_by(step) {
-        let count = step.min(frames - start);
-        for (i, slots) in rows.chunks_exact_mut(step).take(n).enumerate() {
-            row(i, start, &mut slots[..count]);
-        }
-        let out = &mut samples[start * n..(start + count) * n];
-        for k in crate::simd::interleave(isa, &rows, step, n, count, out)..count {
-            (0..n).for_each(|i| out[k * n + i] = rows[i * step + k]);
-        }
-    }
-}
-
-/// Most channels that [`interleave_rows`] takes: 8 samples of each fit its rows.
-const MOST_ROWS: usize = SCRATCH / 8;
-
 /// The frames of a range of another input, where they lie.
 #[derive(Clone)]
 pub struct Frames<'a> {
@@ -213,12 +173,6 @@ impl<'a> Frames<'a> {
         let end = range.end.min(input.frames());
         Self { input, range: range.start.min(end)..end }
     }
-
-    /// The places of the frames among the samples of the input.
-    fn samples(&self) -> Range<usize> {
-        let n = self.channels();
-        self.range.start * n..self.range.end * n
-    }
 }
 
 impl FrameSource for Frames<'_> {
@@ -228,18 +182,6 @@ impl FrameSource for Frames<'_> {
 
     fn frames(&self) -> usize {
         self.range.len()
-    }
-
-    fn in_memory_f32(&self) -> Option<&[f32]> {
-        self.input.in_memory_f32().map(|samples| &samples[self.samples()])
-    }
-
-    fn in_memory_f64(&self) -> Option<&[f64]> {
-        self.input.in_memory_f64().map(|samples| &samples[self.samples()])
-    }
-
-    fn is_finite(&self, frames: Range<usize>) -> bool {
-        self.input.is_finite(self.range.start + frames.start..self.range.start + frames.end)
     }
 
     fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {

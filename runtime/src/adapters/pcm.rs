@@ -1,7 +1,7 @@
 //! Recordings as they lie in files and pipes.
 
-use super::{FrameSink, FrameSource, Halves, SCRATCH, SplitOutput, convert};
-use crate::pcm::{for_pcm_format, peak};
+use super::{FrameSink, FrameSource, Halves, SplitOutput};
+use crate::pcm::peak;
 use crate::simd::{decode, encode};
 use crate::{Isa, PcmFormat, PcmFrames, Sample, SampleLayout};
 use std::ops::Range;
@@ -49,10 +49,17 @@ impl<'a> PcmOutput<'a> {
         numbers.flatten().map(|numbers| &mut numbers[samples])
     }
 
-    /// How the selected samples lie, and the room from sample `first` on.
-    fn from(&mut self, first: usize) -> (SampleLayout, &mut [u8]) {
-        let (layout, before) = self.selected();
-        (layout, &mut self.bytes[before + first * layout.container..])
+    fn store_as<T: Sample>(&mut self, isa: Isa, first: usize, samples: &[T]) {
+        self.encoded_peak = self.encoded_peak.max(peak(samples));
+        let (SampleLayout { format, container }, before) = self.selected();
+        let out = &mut self.bytes[before + first * container..];
+        self.clipped += match container == format.bytes() {
+            true => encode(isa, format, samples, out),
+            false => {
+                let slots = out.chunks_mut(container).zip(samples.chunks(1));
+                slots.map(|(slot, sample)| encode(isa, format, sample, slot)).sum()
+            }
+        };
     }
 
     /// How the selected samples lie, and the bytes before the first one.
@@ -76,52 +83,27 @@ impl FrameSource for PcmFrames<'_> {
         self.frames()
     }
 
-    fn in_memory_f32(&self) -> Option<&[f32]> {
-        native(self)
-    }
-
-    fn in_memory_f64(&self) -> Option<&[f64]> {
-        native(self)
-    }
-
-    fn is_finite(&self, frames: Range<usize>) -> bool {
-        self.range(frames).is_finite()
-    }
-
     fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {
-        let done = if self.layout.is_packed() {
-            decode(isa, self.layout.format, &self.bytes[first * self.frame_bytes()..], samples)
-        } else {
-            0
-        };
-        // Whole frames only; the rest one by one.
-        let done = done / self.channels;
-        load_each(self, first + done, &mut samples[done * self.channels..]);
+        load(self, isa, first, samples);
     }
 
-    fn load_f64(&self, _: Isa, first: usize, samples: &mut [f64]) {
-        load_each(self, first, samples);
+    fn load_f64(&self, isa: Isa, first: usize, samples: &mut [f64]) {
+        load(self, isa, first, samples);
     }
 }
 
-/// The samples as they lie in memory, if they are numbers of type `T`.
-fn native<'a, T: Sample>(frames: &PcmFrames<'a>) -> Option<&'a [T]> {
-    let whole = frames.bytes.len() / frames.frame_bytes() * frames.frame_bytes();
-    is_native::<T>(frames.layout).then(|| bytemuck::try_cast_slice(&frames.bytes[..whole]).ok()).flatten()
-}
-
-/// Frame by frame.
-fn load_each<T: Sample>(frames: &PcmFrames<'_>, first: usize, samples: &mut [T]) {
-    let container = frames.layout.container;
-    // The last sample may end before its container does.
-    let bytes = frames.bytes.chunks(frames.frame_bytes()).skip(first);
-    for_pcm_format!(frames.layout.format, FORMAT => {
-        for (frame, bytes) in samples.chunks_exact_mut(frames.channels).zip(bytes) {
-            for (i, slot) in frame.iter_mut().enumerate() {
-                *slot = T::from_f64(FORMAT.decode(&bytes[i * container..]));
-            }
+fn load<T: Sample>(frames: &PcmFrames<'_>, isa: Isa, first: usize, samples: &mut [T]) {
+    let SampleLayout { format, container } = frames.layout;
+    let bytes = &frames.bytes[first * frames.frame_bytes()..];
+    if frames.layout.is_packed() {
+        return decode(isa, format, bytes, samples);
+    }
+    for (frame, bytes) in samples.chunks_exact_mut(frames.channels).zip(bytes.chunks(frames.frame_bytes())) {
+        for (i, slot) in frame.iter_mut().enumerate() {
+            // The last sample may end before its container does.
+            decode(isa, format, &bytes[i * container..][..format.bytes()], std::slice::from_mut(slot));
         }
-    });
+    }
 }
 
 impl FrameSink for PcmOutput<'_> {
@@ -143,22 +125,11 @@ impl FrameSink for PcmOutput<'_> {
     }
 
     fn store_f32(&mut self, isa: Isa, first: usize, samples: &[f32]) {
-        self.encoded_peak = self.encoded_peak.max(peak(samples));
-        let (layout, out) = self.from(first);
-        self.clipped += match layout.is_packed() {
-            true => encode(isa, layout.format, samples, out),
-            false => encode_each(layout, samples, out),
-        };
+        self.store_as(isa, first, samples);
     }
 
     fn store_f64(&mut self, isa: Isa, first: usize, samples: &[f64]) {
-        self.encoded_peak = self.encoded_peak.max(peak(samples));
-        let (layout, out) = self.from(first);
-        self.clipped += match layout.is_packed() && layout.format.bytes() < 4 {
-            true => encode_by_scratch(isa, layout.format, samples, out),
-            // Formats that hold more digits than f32, and samples apart.
-            false => encode_each(layout, samples, out),
-        };
+        self.store_as(isa, first, samples);
     }
 }
 
@@ -172,35 +143,4 @@ impl SplitOutput for PcmOutput<'_> {
         self.clipped += earlier.clipped + later.clipped;
         self.encoded_peak = self.encoded_peak.max(earlier.encoded_peak).max(later.encoded_peak);
     }
-}
-
-/// Rounded to f32 first, which formats of few digits do not notice.
-fn encode_by_scratch(isa: Isa, format: PcmFormat, samples: &[f64], out: &mut [u8]) -> u64 {
-    let mut scratch = [0f32; SCRATCH];
-    let parts = samples.chunks(SCRATCH).zip(out.chunks_mut(SCRATCH * format.bytes()));
-    parts
-        .map(|(samples, out)| {
-            let scratch = &mut scratch[..samples.len()];
-            convert(samples, scratch);
-            encode(isa, format, scratch, out)
-        })
-        .sum()
-}
-
-/// Sample by sample; returns how many were clipped.
-fn encode_each<T: Sample>(layout: SampleLayout, samples: &[T], out: &mut [u8]) -> u64 {
-    let mut clipped = 0;
-    for_pcm_format!(layout.format, FORMAT => {
-        let mut put = |(slot, value): (&mut [u8], &T)| {
-            // As packed ones: formats of few digits are rounded to f32 first.
-            let value = if FORMAT.bytes() < 4 { f64::from(value.to_f64() as f32) } else { value.to_f64() };
-            clipped += u64::from(FORMAT.encode(value, slot));
-        };
-        if layout.is_packed() {
-            out.chunks_exact_mut(FORMAT.bytes()).zip(samples).for_each(&mut put);
-        } else {
-            out.chunks_mut(layout.container).zip(samples).for_each(&mut put);
-        }
-    });
-    clipped
 }

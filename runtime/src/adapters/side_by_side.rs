@@ -1,9 +1,8 @@
 //! Several inputs side by side.
 
-use super::{FrameSource, MOST_ROWS, SCRATCH, interleave_rows};
+use super::{FrameSource, SCRATCH};
 use crate::{Isa, Sample};
 use std::borrow::Cow;
-use std::ops::Range;
 
 /// Inputs whose channels follow each other; frames are those that all of them have.
 #[derive(Debug, Clone)]
@@ -25,40 +24,20 @@ impl<I: FrameSource + Clone> FrameSource for SideBySide<'_, I> {
         self.0.iter().map(FrameSource::frames).min().unwrap_or(0)
     }
 
-    fn in_memory_f32(&self) -> Option<&[f32]> {
-        if let [alone] = &*self.0 { alone.in_memory_f32() } else { None }
-    }
-
-    fn in_memory_f64(&self) -> Option<&[f64]> {
-        if let [alone] = &*self.0 { alone.in_memory_f64() } else { None }
-    }
-
-    fn is_finite(&self, frames: Range<usize>) -> bool {
-        self.0.iter().all(|input| input.is_finite(frames.clone()))
-    }
-
     fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {
-        match &*self.0 {
-            [alone] => alone.load_f32(isa, first, samples),
-            many if many.len() <= MOST_ROWS && many.iter().all(|input| input.channels() == 1) => {
-                interleave_rows(isa, many.len(), samples, |i, start, row| {
-                    many[i].load_f32(isa, first + start, row);
-                });
-            }
-            many => load_each(many, isa, first, samples),
-        }
+        load_each(&self.0, isa, first, samples);
     }
 
     fn load_f64(&self, isa: Isa, first: usize, samples: &mut [f64]) {
-        match &*self.0 {
-            [alone] => alone.load_f64(isa, first, samples),
-            many => load_each(many, isa, first, samples),
-        }
+        load_each(&self.0, isa, first, samples);
     }
 }
 
 /// One input after the other, each to its columns of the frames.
 fn load_each<T: Sample>(inputs: &[impl FrameSource], isa: Isa, first: usize, samples: &mut [T]) {
+    if let [alone] = inputs {
+        return (alone as &dyn FrameSource).load(isa, first, samples);
+    }
     let n: usize = inputs.iter().map(FrameSource::channels).sum();
     let frames = samples.len() / n.max(1);
     let (mut scratch, mut wide) = ([T::default(); SCRATCH], Vec::new());
@@ -74,9 +53,10 @@ fn load_each<T: Sample>(inputs: &[impl FrameSource], isa: Isa, first: usize, sam
         for start in (0..frames).step_by(step) {
             let loaded = &mut room[..step.min(frames - start) * channels];
             (input as &dyn FrameSource).load(isa, first + start, loaded);
-            let slots = samples[start * n..].chunks_exact_mut(n);
-            for (frame, loaded) in slots.zip(loaded.chunks_exact(channels.max(1))) {
-                frame[column..column + channels].copy_from_slice(loaded);
+            for channel in 0..channels {
+                let slots = samples[start * n + column + channel..].iter_mut().step_by(n);
+                let loaded = loaded[channel..].iter().step_by(channels);
+                slots.zip(loaded).for_each(|(slot, sample)| *slot = *sample);
             }
         }
         column += channels;

@@ -244,7 +244,10 @@ fn quantise(value: f64, bits: u32) -> (i64, bool) {
     let full = (1u64 << bits) as f64;
     let scaled = (value * full).round_ties_even();
     // NaN comes out of a filter only where its sums overflow; the cast makes it 0, and saturates at 2^63.
-    (scaled.clamp(-full, full - 1.0) as i64, scaled < -full || scaled >= full)
+    let held = scaled.clamp(-full, full - 1.0);
+    // Vectors of all processors have integers of 32 bits.
+    let integer = if bits < 32 { i64::from(held as i32) } else { held as i64 };
+    (integer, scaled < -full || scaled >= full)
 }
 
 /// The bit of the sign in the most significant byte: where it is turned, integers count from 0.

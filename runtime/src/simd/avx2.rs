@@ -112,33 +112,6 @@ impl Vector for Avx2F32 {
     unsafe fn store_halves(sums: [Self; 4], out: [*mut f32; 2], hop: usize) {
         Self::diagonal_halves(sums).store_two_halves(out, hop)
     }
-
-    #[inline(always)]
-    unsafe fn load_i16(at: *const u8) -> Self {
-        let wide = _mm256_cvtepi16_epi32(_mm_loadu_si128(at.cast()));
-        Self(_mm256_mul_ps(_mm256_cvtepi32_ps(wide), _mm256_set1_ps(1.0 / 32768.0)))
-    }
-
-    #[inline(always)]
-    unsafe fn load_i32(at: *const u8) -> Self {
-        let wide = _mm256_loadu_si256(at.cast());
-        Self(_mm256_mul_ps(_mm256_cvtepi32_ps(wide), _mm256_set1_ps(1.0 / 2147483648.0)))
-    }
-
-    /// -32768.5 rounds to -32768, which fits, and 32767.5 to 32768, which does not.
-    #[inline(always)]
-    unsafe fn store_i16(self, at: *mut u8) -> u32 {
-        let scaled = _mm256_mul_ps(self.0, _mm256_set1_ps(32768.0));
-        let low = _mm256_cmp_ps::<_CMP_LT_OQ>(scaled, _mm256_set1_ps(-32768.5));
-        let high = _mm256_cmp_ps::<_CMP_GE_OQ>(scaled, _mm256_set1_ps(32767.5));
-        let clipped = _mm256_movemask_ps(_mm256_or_ps(low, high));
-        let number = _mm256_and_ps(scaled, _mm256_cmp_ps::<_CMP_ORD_Q>(scaled, scaled));
-        // What is too small becomes the least i32, and what is too large would; packing saturates.
-        let wide = _mm256_cvtps_epi32(_mm256_min_ps(_mm256_set1_ps(32767.0), number));
-        let packed = _mm_packs_epi32(_mm256_castsi256_si128(wide), _mm256_extracti128_si256::<1>(wide));
-        _mm_storeu_si128(at.cast(), packed);
-        clipped.count_ones()
-    }
 }
 
 impl Avx2F32 {

@@ -274,31 +274,6 @@ impl Vector for Avx512F32 {
             Avx2F32::add_halves(sums.add(16 * last), 2, out.add(2 * last * hop), hop);
         }
     }
-
-    #[inline(always)]
-    unsafe fn load_i16(at: *const u8) -> Self {
-        let wide = _mm512_cvtepi16_epi32(_mm256_loadu_si256(at.cast()));
-        Self(_mm512_mul_ps(_mm512_cvtepi32_ps(wide), _mm512_set1_ps(1.0 / 32768.0)))
-    }
-
-    #[inline(always)]
-    unsafe fn load_i32(at: *const u8) -> Self {
-        let wide = _mm512_loadu_si512(at.cast());
-        Self(_mm512_mul_ps(_mm512_cvtepi32_ps(wide), _mm512_set1_ps(1.0 / 2147483648.0)))
-    }
-
-    /// -32768.5 rounds to -32768, which fits, and 32767.5 to 32768, which does not.
-    #[inline(always)]
-    unsafe fn store_i16(self, at: *mut u8) -> u32 {
-        let scaled = _mm512_mul_ps(self.0, _mm512_set1_ps(32768.0));
-        let low = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(scaled, _mm512_set1_ps(-32768.5));
-        let high = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(scaled, _mm512_set1_ps(32767.5));
-        let number = _mm512_cmp_ps_mask::<_CMP_ORD_Q>(scaled, scaled);
-        // What is too small becomes the least i32, and what is too large would. The conversion saturates.
-        let wide = _mm512_maskz_cvtps_epi32(number, _mm512_min_ps(_mm512_set1_ps(32767.0), scaled));
-        _mm256_storeu_si256(at.cast(), _mm512_cvtsepi32_epi16(wide));
-        (low | high).count_ones()
-    }
 }
 
 impl Avx512F64 {

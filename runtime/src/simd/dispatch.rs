@@ -129,14 +129,3 @@ unsafe fn portable<K: Kernel>(job: K::Job<'_>) -> K::Output {
     // Every processor has these instructions.
     K::run::<<K::Sample as SimdElement>::Portable>(job)
 }
-
-/// Keeps the compiler from computing both sides of a branch and choosing afterwards, where that costs more
-/// than the branch: an empty instruction, which only one side has.
-#[inline(always)]
-pub(super) fn keep_branch() {
-    #[cfg(all(any(target_arch = "x86_64", target_arch = "aarch64"), not(miri)))]
-    // SAFETY: nothing is executed.
-    unsafe {
-        std::arch::asm!("", options(nomem, nostack, preserves_flags));
-    }
-}

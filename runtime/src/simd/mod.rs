@@ -13,15 +13,14 @@
 //! Each kernel is one body that is generic over the vector type, compiled once for each instruction set.
 //! `unsafe` is needed for four things only: to call such a function after the processor was asked, to load
 //! and store vectors at addresses whose bounds the safe wrapper has checked once for the whole call, for
-//! two hints to the compiler in assembly, and to set the mode of denormals.
+//! one hint to the compiler in assembly, and to set the mode of denormals.
 //!
 //! What an unsafe function asks for is said at the function, its trait or the head of its file, and not
 //! again in its body. There are two preconditions. *The set is there*: a function that is generic over a
 //! vector runs only inside [`dispatch`], in a function compiled for the vector's set, which only an [`Isa`]
-//! selects. *The memory is there*: the safe call of each kernel (`Polyphase::run`, `RecursionKernel::run`,
-//! `interleave`) asserts the lengths of its slices once, from the numbers by
-//! which the kernel addresses them. Unsafe blocks in safe functions say which of the two holds there, and
-//! why.
+//! selects. *The memory is there*: the safe call of each kernel (`Polyphase::run`, `RecursionKernel::run`)
+//! asserts the lengths of its slices once, from the numbers by which the kernel addresses them. Unsafe
+//! blocks in safe functions say which of the two holds there, and why.
 //!
 //! Bits: an output is a sum of a fixed shape, lanes of fused multiply-adds and a tree over the lanes (see
 //! `vector`), the same for every instruction set. So it does not depend on vector width, block size, address
@@ -56,12 +55,12 @@ mod vector;
 pub(crate) mod work;
 
 pub(crate) use dispatch::SimdElement;
-pub(crate) use finite::{Replaced, not_finite, replace_not_finite};
-pub(crate) use fir::{FirKernel, Polyphase, Segment, Tiling};
+pub(crate) use finite::{Replaced, replace_not_finite};
+pub(crate) use fir::{FirKernel, Polyphase, Tiling};
 pub(crate) use flush::flushing;
 pub use isa::Isa;
 pub(crate) use lanes::{Lanes, Row};
-pub(crate) use pcm::{decode, encode, interleave};
+pub(crate) use pcm::{decode, encode};
 pub use peak::multiply_add_chains;
 pub(crate) use recursion::{ColumnTile, Recursion, RecursionForm, RecursionKernel, SectionVector};
 pub(crate) use spectra::{Product, multiply};

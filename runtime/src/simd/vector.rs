@@ -249,34 +249,4 @@ pub(crate) trait Vector: Copy {
             out.add(index * hop).copy_from_nonoverlapping(outputs.as_ptr(), 4);
         }
     }
-
-    /// Samples from little-endian 16-bit integers, which are divided by 2^15.
-    #[inline(always)]
-    unsafe fn load_i16(at: *const u8) -> Self {
-        let scale = Self::Sample::from(1.0 / 32768.0);
-        let integer = |l: usize| i16::from_le(at.cast::<i16>().add(l).read_unaligned());
-        Self::from_fn(|l| Self::Sample::from(f32::from(integer(l))) * scale)
-    }
-
-    /// Samples from little-endian 32-bit integers, rounded to the nearest, which are divided by 2^31.
-    #[inline(always)]
-    unsafe fn load_i32(at: *const u8) -> Self {
-        let scale = Self::Sample::from(1.0 / 2147483648.0);
-        let integer = |l: usize| i32::from_le(at.cast::<i32>().add(l).read_unaligned());
-        Self::from_fn(|l| Self::Sample::from(integer(l) as f32) * scale)
-    }
-
-    /// Samples times 2^15 to the nearest little-endian 16-bit integers, ties to even; NaN becomes 0. Returns
-    /// how many were clipped: those that do not round to a 16-bit integer.
-    #[inline(always)]
-    unsafe fn store_i16(self, at: *mut u8) -> u32 {
-        let mut clipped = 0;
-        for (l, value) in self.to_array().into_iter().enumerate().take(Self::LANES) {
-            let scaled = (value.into() * 32768.0).round_ties_even();
-            clipped += u32::from(!(-32768.0..=32767.0).contains(&scaled) && !scaled.is_nan());
-            // The cast saturates.
-            at.cast::<i16>().add(l).write_unaligned((scaled as i16).to_le());
-        }
-        clipped
-    }
 }

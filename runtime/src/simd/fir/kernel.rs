@@ -8,7 +8,7 @@ use super::single::Single;
 use super::tiling::{FirJob, Tiling};
 use std::marker::PhantomData;
 
-/// Returns false if a sum that is checked is not finite, or the total of those that are.
+/// Returns false if a sum of the first phase is not finite, or the total of them.
 pub(super) type FirFn<T> = for<'a> unsafe fn(&'a FirJob<'a, T>) -> bool;
 
 /// P phases with windows cut into steps of D samples.

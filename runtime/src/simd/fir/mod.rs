@@ -12,5 +12,5 @@ mod single;
 mod tiling;
 
 pub(crate) use kernel::FirKernel;
-pub(crate) use polyphase::{Polyphase, Segment, widths};
+pub(crate) use polyphase::Polyphase;
 pub(crate) use tiling::Tiling;

@@ -7,11 +7,10 @@
 //! once and a long chain of shuffles and stores after them would stop the multiply-adds: the first lanes are
 //! added in registers and go to scratch memory; from there they are brought into order after the next tile.
 //!
-//! Unsafe functions here run in code compiled for the instruction set of V. They read windows of the chunks'
+//! Unsafe functions here run in code compiled for the instruction set of V. They read windows of the chunk's
 //! frames and coefficients of the job, and write outputs of these frames and to the scratch: memory whose
 //! bounds `Polyphase::run` asserts for whole vectors of frames.
 
-use super::super::dispatch::keep_branch;
 use super::super::vector::Vector;
 use super::tiling::{FirJob, FrameChunk, sized, tile_size};
 
@@ -22,7 +21,7 @@ pub(super) struct Phases<'a, V: Vector, const D: usize, const P: usize> {
     /// The tile in scratch: its first frame and its vectors, 0 if there is none.
     first: usize,
     waiting: usize,
-    /// Of the sums that are checked, lane by lane: not finite if one of them is not.
+    /// Of the sums of the first phase, lane by lane: not finite if one of them is not.
     total: V,
 }
 
@@ -53,25 +52,17 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     /// As for [`Vector`].
     #[inline(always)]
     pub(super) unsafe fn new(job: &'a FirJob<'a, V::Sample>) -> Self {
-        Self { job, chunk: FrameChunk::NONE, first: 0, waiting: 0, total: V::zero() }
+        let FrameChunk { x, out, frames } = job.chunk;
+        let chunk = FrameChunk { x, out: out.wrapping_add(job.first), frames };
+        Self { job, chunk, first: 0, waiting: 0, total: V::zero() }
     }
 
-    /// All frames.
+    /// All frames in the largest tiles; what is left is halved, so that no tile is small.
     ///
     /// # Safety
     /// As for [`Vector`]; the job's memory is there.
     #[inline(always)]
     pub(super) unsafe fn run(&mut self) -> bool {
-        for &FrameChunk { x, out, frames } in self.job.chunks {
-            self.chunk = FrameChunk { x, out: out.wrapping_add(self.job.first), frames };
-            self.run_chunk();
-        }
-        self.total.finite()
-    }
-
-    /// In the largest tiles; what is left is halved, so that no tile is small.
-    #[inline(always)]
-    unsafe fn run_chunk(&mut self) {
         let mut left = self.chunk.frames / Self::FRAMES;
         let mut first = 0;
         while left > 0 {
@@ -84,6 +75,7 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
         if const { Self::IN_PARTS } {
             self.flush();
         }
+        self.total.finite()
     }
 
     /// R vectors from frame `first` on.
@@ -116,25 +108,9 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     }
 
     /// Remembers whether inputs are finite: they reach the sums of every phase, whatever the coefficients.
-    // Indices, because iterators of this many kernels are most of what is compiled here.
-    #[allow(clippy::needless_range_loop)]
     #[inline(always)]
     fn check<const R: usize>(&mut self, sums: &[V; R]) {
-        let checked = self.job.tiling.checked;
-        // Long filters are asked once a tile, short ones about every vector.
-        if checked == !0 {
-            for r in 0..R - 1 {
-                self.total = self.total.add(sums[r]);
-            }
-        } else if checked & const { (1 << (R - 1)) - 1 } != 0 {
-            for r in 0..R - 1 {
-                if checked >> r & 1 == 1 {
-                    keep_branch();
-                    self.total = self.total.add(sums[r]);
-                }
-            }
-        }
-        self.total = self.total.add(sums[R - 1]);
+        sums.iter().for_each(|sum| self.total = self.total.add(*sum));
     }
 
     /// The sums of a tile to their places in the output, in the order of frames.

@@ -10,14 +10,13 @@
 //!
 //! Unsafe functions here ask for the same as those of `phases`.
 
-use super::super::dispatch::keep_branch;
 use super::super::vector::Vector;
 use super::tiling::{FirJob, FrameChunk, Pairing, sized, tile_size};
 
 /// A single phase on all frames of a job, in vectors of one group.
 pub(super) struct Single<'a, V: Vector, const D: usize> {
     job: &'a FirJob<'a, V::Sample>,
-    /// Of the sums that are checked, lane by lane: not finite if one of them is not.
+    /// Of the sums of the first phase, lane by lane: not finite if one of them is not.
     total: V,
 }
 
@@ -29,22 +28,13 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
         Self { job, total: V::zero() }
     }
 
-    /// All frames.
+    /// All frames, in blocks of as many as a group has lanes: their sums are added together.
     ///
     /// # Safety
     /// As for [`Vector`]; the job's memory is there.
     #[inline(always)]
     pub(super) unsafe fn run(&mut self) -> bool {
-        for chunk in self.job.chunks {
-            self.chunk(chunk);
-        }
-        self.total.finite()
-    }
-
-    /// Blocks of as many frames as a group has lanes: their sums are added together.
-    #[inline(always)]
-    unsafe fn chunk(&mut self, &FrameChunk { x, out, frames }: &FrameChunk<V::Sample>) {
-        let FirJob { tiling, scratch, .. } = *self.job;
+        let FirJob { tiling, scratch, chunk: FrameChunk { x, out, frames }, .. } = *self.job;
         let pairing = tiling.pairing;
         // Vectors of a block in each of the tiles, and blocks at once: of twelve sums three blocks of 8 are
         // two tiles.
@@ -63,12 +53,13 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
                 for block in 0..blocks {
                     let sums = scratch.add(block * V::GROUP * D);
                     let outputs = V::sum_frames::<D>(|t| V::load(sums.add(t * D)));
-                    self.store(block, blocks, outputs, out.add(first));
+                    self.store(block, outputs, out.add(first));
                 }
             }
             first += blocks * V::GROUP;
             left -= blocks;
         }
+        self.total.finite()
     }
 
     /// Samples from vector to vector; a constant where D does not fill a group.
@@ -77,13 +68,10 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
         if D < V::GROUP { V::GROUP } else { apart * D }
     }
 
-    /// Stores the outputs of a block, and remembers whether they are finite as in groups of phases.
+    /// Stores the outputs of a block, and remembers whether they are finite.
     #[inline(always)]
-    unsafe fn store(&mut self, block: usize, blocks: usize, outputs: V, out: *mut V::Sample) {
-        if block + 1 == blocks || self.job.tiling.checked >> block & 1 == 1 {
-            keep_branch();
-            self.total = self.total.add(outputs);
-        }
+    unsafe fn store(&mut self, block: usize, outputs: V, out: *mut V::Sample) {
+        self.total = self.total.add(outputs);
         outputs.store(out.add(block * V::GROUP));
     }
 
@@ -138,7 +126,7 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
             return;
         }
         for block in 0..R / D {
-            self.store(block, R / D, V::sum_frames::<D>(|r| sums[block * D + r]), to);
+            self.store(block, V::sum_frames::<D>(|r| sums[block * D + r]), to);
         }
     }
 

@@ -13,8 +13,6 @@ pub(crate) struct Tiling {
     pub(crate) history: usize,
     /// Frames of a vector, a power of two: calls for a multiple of them read nothing past their last frame.
     pub(crate) vector: usize,
-    /// Bit r: whether the sums of vector r of each tile are checked. Those of its last vector always are.
-    pub(super) checked: u32,
     /// The order of steps for a single phase.
     pub(super) pairing: Pairing,
 }
@@ -32,7 +30,6 @@ impl Tiling {
             hop,
             history: steps * depth - hop,
             vector,
-            checked: checked_vectors(steps * depth / hop, vector),
             pairing: Pairing::new(depth, hop, group, steps),
         }
     }
@@ -51,18 +48,6 @@ impl Tiling {
     /// The steps in the order of use for groups of `width` phases; step 0 is the newest.
     pub(super) fn order(&self, width: usize) -> Vec<usize> {
         if width == 1 { self.pairing.order() } else { (0..self.steps).collect() }
-    }
-}
-
-/// The vectors of a tile that must be checked, if an input that is not finite shows in all outputs of
-/// `reach` frames and a vector holds `frames` of them: every one, every second, every fourth ...
-fn checked_vectors(reach: usize, frames: usize) -> u32 {
-    match (reach >> frames.trailing_zeros()).checked_ilog2().unwrap_or(0) {
-        0 => !0,
-        1 => 0xAAAA_AAAA,
-        2 => 0x8888_8888,
-        3 => 0x8080_8080,
-        _ => 0x8000_8000,
     }
 }
 
@@ -112,16 +97,12 @@ pub(super) struct FrameChunk<T> {
     pub(super) frames: usize,
 }
 
-impl<T> FrameChunk<T> {
-    pub(super) const NONE: Self = Self { x: std::ptr::null(), out: std::ptr::null_mut(), frames: 0 };
-}
-
 /// One call of a kernel, checked.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FirJob<'a, T> {
     pub(super) tiling: &'a Tiling,
     pub(super) coefficients: *const T,
-    pub(super) chunks: &'a [FrameChunk<T>],
+    pub(super) chunk: FrameChunk<T>,
     /// The first phase.
     pub(super) first: usize,
     pub(super) out_hop: usize,
