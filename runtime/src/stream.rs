@@ -14,7 +14,7 @@ use crate::{Plan, ProcessError, Sample, StateError};
 /// A frame is one sample of each of the N channels; each gives M output samples, p = 0..M - 1. All calls
 /// take whole frames and return the samples written. They allocate nothing and lock nothing (except those of
 /// a [`ThreadPool`](crate::ThreadPool)), and the same frames give the same bits however they are cut into
-/// calls. [Offsets](Plan::with_corrections) cost a pass over the samples.
+/// calls. [Offsets](Plan::with_corrections) cost a copy of the samples.
 ///
 /// # Worst case of a call
 /// NaN and infinity in the input become 0 and are counted, see [`Stream::replaced`]. Whatever the input
@@ -27,7 +27,7 @@ use crate::{Plan, ProcessError, Sample, StateError};
 /// | overlap-save | replaced first; filtered once | filtered once; all outputs of the batch may be NaN |
 /// | recursive | replaced first; filtered once | filtered once; state 0, [counted](Self::state_resets) |
 ///
-/// The search for what is not finite passes over the input at most once.
+/// The search for what is not finite passes over the input at most three times.
 ///
 /// Denormals change none of these counts: numbers below 1.2e-38 in f32 and below 2.3e-308 in f64 count as 0,
 /// on every processor, whatever floating-point mode the thread has; that mode is as before after the call.

@@ -246,6 +246,18 @@ impl FrameSource for NumberFrames<'_> {
         self.input().frames()
     }
 
+    fn in_memory_f32(&self) -> Option<&[f32]> {
+        self.input().in_memory_f32()
+    }
+
+    fn in_memory_f64(&self) -> Option<&[f64]> {
+        self.input().in_memory_f64()
+    }
+
+    fn is_finite(&self, frames: Range<usize>) -> bool {
+        self.input().is_finite(frames)
+    }
+
     fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {
         self.input().load_f32(isa, first, samples);
     }

@@ -145,7 +145,7 @@ impl GapFiller {
             part.load_f64(Isa::detect(), 0, &mut numbers[begin..]);
         }
         self.known.resize(end, Known::There);
-        if !self.numbers.iter().all(|part| part[begin..].iter().all(|x| x.is_finite())) {
+        if !parts.iter().all(|part| part.is_finite(0..frames)) {
             (begin..end).for_each(|index| self.find_missing(index));
         }
         self.come_out()

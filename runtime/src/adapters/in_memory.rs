@@ -1,7 +1,7 @@
 //! Samples in memory, frame after frame or channel after channel.
 
 use super::{FrameSink, FrameSource, Halves, SplitOutput, convert};
-use crate::sample::same_mut;
+use crate::sample::{same, same_mut};
 use crate::{Isa, ProcessError, Sample};
 use std::ops::Range;
 
@@ -44,6 +44,19 @@ impl<S: Sample> FrameSource for Interleaved<'_, S> {
 
     fn frames(&self) -> usize {
         self.frames
+    }
+
+    fn in_memory_f32(&self) -> Option<&[f32]> {
+        same(self.samples)
+    }
+
+    fn in_memory_f64(&self) -> Option<&[f64]> {
+        same(self.samples)
+    }
+
+    fn is_finite(&self, frames: Range<usize>) -> bool {
+        let samples = &self.samples[frames.start * self.channels..frames.end * self.channels];
+        samples.iter().all(|sample| sample.to_f64().is_finite())
     }
 
     fn load_f32(&self, _: Isa, first: usize, samples: &mut [f32]) {
@@ -106,6 +119,11 @@ impl<'a, S: Sample> Planar<'a, S> {
         }
     }
 
+    /// One channel is interleaved as it lies.
+    fn alone(&self) -> Option<&[S]> {
+        if let [alone] = self.channels { Some(alone) } else { None }
+    }
+
     fn load_each<T: Sample>(&self, first: usize, samples: &mut [T]) {
         let n = self.channels.len();
         for (i, channel) in self.channels.iter().enumerate() {
@@ -122,6 +140,20 @@ impl<S: Sample> FrameSource for Planar<'_, S> {
 
     fn frames(&self) -> usize {
         self.frames
+    }
+
+    fn in_memory_f32(&self) -> Option<&[f32]> {
+        self.alone().and_then(same)
+    }
+
+    fn in_memory_f64(&self) -> Option<&[f64]> {
+        self.alone().and_then(same)
+    }
+
+    fn is_finite(&self, frames: Range<usize>) -> bool {
+        self.channels
+            .iter()
+            .all(|channel| channel[frames.clone()].iter().all(|sample| sample.to_f64().is_finite()))
     }
 
     fn load_f32(&self, _: Isa, first: usize, samples: &mut [f32]) {

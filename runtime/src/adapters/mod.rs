@@ -30,6 +30,21 @@ pub trait FrameSource: Sync {
     /// Frames of the call.
     fn frames(&self) -> usize;
 
+    /// All samples, frame after frame, if they lie so in memory as f32. The kernels read them there.
+    fn in_memory_f32(&self) -> Option<&[f32]> {
+        None
+    }
+
+    /// As [`FrameSource::in_memory_f32`].
+    fn in_memory_f64(&self) -> Option<&[f64]> {
+        None
+    }
+
+    /// True if no sample of some frames is NaN or infinite; false where that is not looked at.
+    fn is_finite(&self, _frames: Range<usize>) -> bool {
+        false
+    }
+
     /// Copies frames from frame `first` on to `samples`, frame after frame: `samples.len() / N` frames, all
     /// of which are there. NaN and infinity are copied as they are. `isa` is the instruction set for
     /// conversions.
@@ -77,6 +92,10 @@ pub type Halves<'w> = &'w mut dyn FnMut(&mut dyn SplitOutput, &mut dyn SplitOutp
 
 /// By number type.
 impl dyn FrameSource + '_ {
+    pub(crate) fn in_memory<T: Sample>(&self) -> Option<&[T]> {
+        self.in_memory_f32().and_then(same).or_else(|| self.in_memory_f64().and_then(same))
+    }
+
     /// [`FrameSource::load_f32`] or [`FrameSource::load_f64`].
     pub fn load<T: Sample>(&self, isa: Isa, first: usize, samples: &mut [T]) {
         if let Some(samples) = same_mut(samples) {
@@ -173,6 +192,12 @@ impl<'a> Frames<'a> {
         let end = range.end.min(input.frames());
         Self { input, range: range.start.min(end)..end }
     }
+
+    /// The places of the frames among the samples of the input.
+    fn samples(&self) -> Range<usize> {
+        let n = self.channels();
+        self.range.start * n..self.range.end * n
+    }
 }
 
 impl FrameSource for Frames<'_> {
@@ -182,6 +207,18 @@ impl FrameSource for Frames<'_> {
 
     fn frames(&self) -> usize {
         self.range.len()
+    }
+
+    fn in_memory_f32(&self) -> Option<&[f32]> {
+        self.input.in_memory_f32().map(|samples| &samples[self.samples()])
+    }
+
+    fn in_memory_f64(&self) -> Option<&[f64]> {
+        self.input.in_memory_f64().map(|samples| &samples[self.samples()])
+    }
+
+    fn is_finite(&self, frames: Range<usize>) -> bool {
+        self.input.is_finite(self.range.start + frames.start..self.range.start + frames.end)
     }
 
     fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {

@@ -83,6 +83,18 @@ impl FrameSource for PcmFrames<'_> {
         self.frames()
     }
 
+    fn in_memory_f32(&self) -> Option<&[f32]> {
+        native(self)
+    }
+
+    fn in_memory_f64(&self) -> Option<&[f64]> {
+        native(self)
+    }
+
+    fn is_finite(&self, frames: Range<usize>) -> bool {
+        self.range(frames).is_finite()
+    }
+
     fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {
         load(self, isa, first, samples);
     }
@@ -90,6 +102,12 @@ impl FrameSource for PcmFrames<'_> {
     fn load_f64(&self, isa: Isa, first: usize, samples: &mut [f64]) {
         load(self, isa, first, samples);
     }
+}
+
+/// The samples as they lie in memory, if they are numbers of type `T`.
+fn native<'a, T: Sample>(frames: &PcmFrames<'a>) -> Option<&'a [T]> {
+    let whole = frames.bytes.len() / frames.frame_bytes() * frames.frame_bytes();
+    is_native::<T>(frames.layout).then(|| bytemuck::try_cast_slice(&frames.bytes[..whole]).ok()).flatten()
 }
 
 fn load<T: Sample>(frames: &PcmFrames<'_>, isa: Isa, first: usize, samples: &mut [T]) {

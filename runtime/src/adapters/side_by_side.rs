@@ -3,6 +3,7 @@
 use super::{FrameSource, SCRATCH};
 use crate::{Isa, Sample};
 use std::borrow::Cow;
+use std::ops::Range;
 
 /// Inputs whose channels follow each other; frames are those that all of them have.
 #[derive(Debug, Clone)]
@@ -22,6 +23,18 @@ impl<I: FrameSource + Clone> FrameSource for SideBySide<'_, I> {
 
     fn frames(&self) -> usize {
         self.0.iter().map(FrameSource::frames).min().unwrap_or(0)
+    }
+
+    fn in_memory_f32(&self) -> Option<&[f32]> {
+        if let [alone] = &*self.0 { alone.in_memory_f32() } else { None }
+    }
+
+    fn in_memory_f64(&self) -> Option<&[f64]> {
+        if let [alone] = &*self.0 { alone.in_memory_f64() } else { None }
+    }
+
+    fn is_finite(&self, frames: Range<usize>) -> bool {
+        self.0.iter().all(|input| input.is_finite(frames.clone()))
     }
 
     fn load_f32(&self, isa: Isa, first: usize, samples: &mut [f32]) {

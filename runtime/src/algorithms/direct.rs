@@ -11,7 +11,7 @@ use super::filter::{AlgorithmFacts, Filter, check_finite, phase_taps};
 use crate::adapters::{FrameSink, FrameSource};
 use crate::aligned::Aligned;
 use crate::history::History;
-use crate::simd::{FirKernel, Polyphase, Replaced, Tiling, replace_not_finite};
+use crate::simd::{FirKernel, Polyphase, Replaced, Segment, Tiling, not_finite, replace_not_finite};
 use crate::state::{Count, StateNumbers};
 use crate::{BuildError, Isa, Sample};
 use std::ops::Range;
@@ -20,6 +20,9 @@ use std::ops::Range;
 const CACHE_SAMPLES: usize = 4096;
 /// Frames of a block are a multiple of this, and so of every tile.
 const BLOCK_UNIT: usize = 96;
+/// Copying all frames of a call of fewer samples is cheaper than one more tile of the kernel.
+const SHORT_CALL: usize = 256;
+
 /// Coefficients in the order of use.
 #[derive(Debug)]
 pub(crate) struct Direct<T: Sample> {
@@ -87,6 +90,68 @@ impl<T: Sample> Direct<T> {
         self.history_frames
     }
 
+    /// Frames at the beginning of a call that go through the state's history although the others need not:
+    /// those whose history is there, and as many as it takes for the others to fill vectors. `None` if all
+    /// had better go there.
+    fn head(&self, frames: usize) -> Option<usize> {
+        let vector = self.filters.tiling.vector;
+        let head = self.history_frames + (frames.wrapping_sub(self.history_frames) & (vector - 1));
+        let pays = frames * self.channels >= SHORT_CALL && frames >= 2 * head;
+        (pays && head <= self.block).then_some(head)
+    }
+
+    /// Filters samples in the caller's memory to outputs there, block by block; returns how many were not
+    /// finite and were taken as 0. Frames whose windows hold some of these go through the history.
+    ///
+    /// The head is filtered last in its block: its loads would straddle recent stores, and store forwarding
+    /// would stall.
+    fn process_in_memory(&self, history: &mut History<T>, samples: &[T], head: usize, out: &mut [T]) -> u64 {
+        let (n, &Tiling { history: before, vector, .. }) = (self.channels, &self.filters.tiling);
+        let frames = samples.len() / n;
+        let segment = |first: usize, end: usize| {
+            let x = &samples[first * n - before..end * n];
+            Segment { x, first, frames: end - first }
+        };
+        // Whole vectors, so that all blocks after it are whole vectors too.
+        let first = head + ((self.block - head) & !(vector - 1));
+        let (mut done, mut end, mut replaced) = (0, frames.min(first), 0);
+        // The history is that of frame `followed`. Windows of frames before `clean` may hold NaN.
+        let (mut followed, mut clean) = (0, 0);
+        while done < frames {
+            let filtered = done >= clean;
+            let finite = filtered
+                && if done == 0 {
+                    history.room(head).copy_from_slice(&samples[..head * n]);
+                    let begin = Segment { x: history.view(), first: 0, frames: head };
+                    self.filters.run(&[segment(head, end), begin], out)
+                } else {
+                    self.filters.run(&[segment(done, end)], out)
+                };
+            if !finite {
+                let again = if filtered { self.suspects(samples, done..end) } else { done..end };
+                if followed < again.start {
+                    history.load(&samples[..again.start * n]);
+                }
+                history.room(again.len()).copy_from_slice(&samples[again.start * n..again.end * n]);
+                let lost = self.replace(history, again.len());
+                let touched = if filtered { lost.touched.clone() } else { 0..again.len() };
+                self.filter_again(history, touched, again.clone(), out);
+                history.advance(again.len());
+                (replaced, followed) = (replaced + lost.count, again.end);
+                clean = clean.max(again.start + lost.touched.end);
+                // Where there are many, more are to come: the next block is not filtered in vain.
+                if 2 * lost.touched.len() > end - done {
+                    clean = clean.max(end + 1);
+                }
+            }
+            (done, end) = (end, frames.min(end + self.block));
+        }
+        if followed < frames {
+            history.load(samples);
+        }
+        replaced
+    }
+
     /// Filters at most a block through the state's history; returns how many samples were not finite and
     /// were taken as 0.
     fn process_block(
@@ -101,11 +166,11 @@ impl<T: Sample> Direct<T> {
         input.load(self.isa, frames.start, history.room(len));
         let mut filter = |out: &mut [T]| {
             // Filtered first: hardly ever is there anything to replace.
-            if self.filters.run(history.view(), len, out) {
+            if self.filters.run(&[Segment { x: history.view(), first: 0, frames: len }], out) {
                 return 0;
             }
             let lost = self.replace(history, len);
-            self.filter_again(history, lost.touched, len, out);
+            self.filter_again(history, lost.touched, 0..len, out);
             lost.count
         };
         let replaced = match output.slots(samples.clone()) {
@@ -121,6 +186,18 @@ impl<T: Sample> Direct<T> {
         replaced
     }
 
+    /// The frames of a block in memory whose windows may hold samples that are not finite.
+    fn suspects(&self, samples: &[T], block: Range<usize>) -> Range<usize> {
+        let n = self.channels;
+        let places = not_finite(&samples[block.start * n..block.end * n]);
+        let first = block.start + places.start / n;
+        if first < self.history_frames {
+            // The windows of the first frames begin in the history.
+            return block;
+        }
+        first..block.end.min(block.start + places.end.div_ceil(n) + self.history_frames)
+    }
+
     /// Zeros in place of what is not finite in the frames of the history's room.
     fn replace(&self, history: &mut History<T>, frames: usize) -> Lost {
         let Replaced { count, places } = replace_not_finite(self.isa, history.room(frames));
@@ -128,12 +205,13 @@ impl<T: Sample> Direct<T> {
         Lost { count, touched: places.start / self.channels..places.end.div_ceil(self.channels) + reach }
     }
 
-    /// Filters `touched` of the `frames` frames in the history's room.
-    fn filter_again(&self, history: &History<T>, touched: Range<usize>, frames: usize, out: &mut [T]) {
+    /// Filters `touched` of the frames in the history's room, whose outputs are those of a range of frames.
+    fn filter_again(&self, history: &History<T>, touched: Range<usize>, frames: Range<usize>, out: &mut [T]) {
         // Whole vectors take least time.
         let len = touched.len().next_multiple_of(self.filters.tiling.vector);
+        let len = len.min(frames.len() - touched.start);
         let x = &history.view()[touched.start * self.channels..];
-        self.filters.run(x, len.min(frames - touched.start), &mut out[touched.start * self.ratio..]);
+        self.filters.run(&[Segment { x, first: frames.start + touched.start, frames: len }], out);
     }
 
     /// A state before frame `first` of `input`, as if all frames before it had been processed: at least
@@ -183,6 +261,11 @@ impl<T: Sample> Filter for Direct<T> {
         output: &mut dyn FrameSink,
     ) -> u64 {
         let frames = input.frames();
+        if let (Some(head), Some(samples)) = (self.head(frames), input.in_memory())
+            && let Some(out) = output.slots(0..frames * self.ratio)
+        {
+            return self.process_in_memory(&mut state.history, samples, head, out);
+        }
         let (mut done, mut replaced) = (0, 0);
         while done < frames {
             let end = frames.min(done + self.block);

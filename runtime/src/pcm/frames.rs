@@ -73,4 +73,23 @@ impl<'a> PcmFrames<'a> {
         let end = (frames.end * size).min(self.bytes.len());
         PcmFrames { bytes: &self.bytes[frames.start * size..end], ..*self }
     }
+
+    /// True if no sample is NaN or infinite, nor any that lies between them; integers never are.
+    pub fn is_finite(&self) -> bool {
+        match self.layout.format {
+            PcmFormat::F32Le => all_finite(self.bytes, |b| u32::from_le_bytes(b) << 1 < 0xFF00_0000),
+            PcmFormat::F32Be => all_finite(self.bytes, |b| u32::from_be_bytes(b) << 1 < 0xFF00_0000),
+            PcmFormat::F64Le => all_finite(self.bytes, |b| u64::from_le_bytes(b) << 1 < 0xFFE0 << 48),
+            PcmFormat::F64Be => all_finite(self.bytes, |b| u64::from_be_bytes(b) << 1 < 0xFFE0 << 48),
+            PcmFormat::F16Le => all_finite(self.bytes, |b| u16::from_le_bytes(b) << 1 < 0xF800),
+            PcmFormat::F16Be => all_finite(self.bytes, |b| u16::from_be_bytes(b) << 1 < 0xF800),
+            _ => true,
+        }
+    }
+}
+
+/// Samples that lie close together, in blocks without an early end, so that each becomes one vector loop.
+fn all_finite<const B: usize>(bytes: &[u8], finite: impl Fn([u8; B]) -> bool) -> bool {
+    let (samples, _) = bytes.as_chunks::<B>();
+    samples.chunks(1024).all(|block| block.iter().fold(true, |all, &sample| all & finite(sample)))
 }

@@ -53,6 +53,13 @@ impl<T: SimdElement> Kernel for ReplaceNotFinite<T> {
     }
 }
 
+/// From the first sample that is not finite to the last one; none if all are.
+pub(crate) fn not_finite<T: SimdElement>(samples: &[T]) -> Range<usize> {
+    let is_lost = |sample: &T| !sample.is_finite();
+    let first = samples.iter().position(is_lost).unwrap_or(samples.len());
+    first..samples[first..].iter().rposition(is_lost).map_or(first, |last| first + last + 1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,6 +81,7 @@ mod tests {
     fn sums_that_overflow_are_finite_samples() {
         for isa in Isa::available() {
             let mut samples = [f32::MAX; 200];
+            assert!(not_finite(&samples).is_empty());
             assert_eq!(replace_not_finite(isa, &mut samples), Replaced { count: 0, places: 0..0 });
         }
     }
@@ -85,14 +93,19 @@ mod tests {
             let lengths: &[usize] = if cfg!(miri) { &[1, 35] } else { &[1, 7, 63, 64, 65, 200] };
             for &len in lengths {
                 let clean: Vec<f32> = (0..len).map(|i| i as f32 - 50.0).collect();
+                assert!(not_finite(&clean).is_empty());
                 for place in 0..len {
                     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
                         let mut samples = clean.clone();
                         samples[place] = bad;
+                        assert!(not_finite(&samples).contains(&place), "{bad} at {place} of {len}");
                         check_replaced(isa, samples.clone(), &[place]);
                         // Two infinities do not cancel.
                         samples[(place + 64) % len] = -bad;
+                        assert!(!not_finite(&samples).is_empty());
                         check_replaced(isa, samples.clone(), &[place, (place + 64) % len]);
+                        let wide: Vec<f64> = samples.iter().map(|&x| f64::from(x)).collect();
+                        assert!(!not_finite(&wide).is_empty());
                     }
                 }
             }

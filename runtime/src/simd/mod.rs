@@ -55,8 +55,8 @@ mod vector;
 pub(crate) mod work;
 
 pub(crate) use dispatch::SimdElement;
-pub(crate) use finite::{Replaced, replace_not_finite};
-pub(crate) use fir::{FirKernel, Polyphase, Tiling};
+pub(crate) use finite::{Replaced, not_finite, replace_not_finite};
+pub(crate) use fir::{FirKernel, Polyphase, Segment, Tiling};
 pub(crate) use flush::flushing;
 pub use isa::Isa;
 pub(crate) use lanes::{Lanes, Row};

@@ -18,7 +18,9 @@ use super::filter::{AlgorithmFacts, Filter};
 use crate::adapters::{FrameSink, FrameSource};
 use crate::aligned::Aligned;
 use crate::history::History;
-use crate::simd::{FirKernel, Polyphase, Recursion, RecursionForm, RecursionKernel, replace_not_finite};
+use crate::simd::{
+    FirKernel, Polyphase, Recursion, RecursionForm, RecursionKernel, Segment, replace_not_finite,
+};
 use crate::state::{Count, StateNumbers};
 use crate::{BuildError, Isa};
 
@@ -116,9 +118,9 @@ impl Recursive {
     fn filter(&self, state: &mut RecursiveState, frames: usize) {
         let RecursiveState { history, rows, output, state_output, .. } = state;
         self.advance.run(&self.recursion, rows, history.view(), self.channels, frames);
-        self.feedthrough.run(history.view(), frames, output);
+        self.feedthrough.run(&[Segment { x: history.view(), first: 0, frames }], output);
         if self.recursion.states > 0 {
-            self.output_matrix.run(rows, frames, state_output);
+            self.output_matrix.run(&[Segment { x: rows, first: 0, frames }], state_output);
             output.iter_mut().zip(&state_output[..frames * self.ratio]).for_each(|(y, more)| *y += *more);
         }
     }

@@ -12,5 +12,5 @@ mod single;
 mod tiling;
 
 pub(crate) use kernel::FirKernel;
-pub(crate) use polyphase::Polyphase;
+pub(crate) use polyphase::{Polyphase, Segment};
 pub(crate) use tiling::Tiling;

@@ -7,7 +7,7 @@
 //! once and a long chain of shuffles and stores after them would stop the multiply-adds: the first lanes are
 //! added in registers and go to scratch memory; from there they are brought into order after the next tile.
 //!
-//! Unsafe functions here run in code compiled for the instruction set of V. They read windows of the chunk's
+//! Unsafe functions here run in code compiled for the instruction set of V. They read windows of the chunks'
 //! frames and coefficients of the job, and write outputs of these frames and to the scratch: memory whose
 //! bounds `Polyphase::run` asserts for whole vectors of frames.
 
@@ -52,17 +52,25 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
     /// As for [`Vector`].
     #[inline(always)]
     pub(super) unsafe fn new(job: &'a FirJob<'a, V::Sample>) -> Self {
-        let FrameChunk { x, out, frames } = job.chunk;
-        let chunk = FrameChunk { x, out: out.wrapping_add(job.first), frames };
-        Self { job, chunk, first: 0, waiting: 0, total: V::zero() }
+        Self { job, chunk: FrameChunk::NONE, first: 0, waiting: 0, total: V::zero() }
     }
 
-    /// All frames in the largest tiles; what is left is halved, so that no tile is small.
+    /// All frames.
     ///
     /// # Safety
     /// As for [`Vector`]; the job's memory is there.
     #[inline(always)]
     pub(super) unsafe fn run(&mut self) -> bool {
+        for &FrameChunk { x, out, frames } in self.job.chunks {
+            self.chunk = FrameChunk { x, out: out.wrapping_add(self.job.first), frames };
+            self.run_chunk();
+        }
+        self.total.finite()
+    }
+
+    /// In the largest tiles; what is left is halved, so that no tile is small.
+    #[inline(always)]
+    unsafe fn run_chunk(&mut self) {
         let mut left = self.chunk.frames / Self::FRAMES;
         let mut first = 0;
         while left > 0 {
@@ -75,7 +83,6 @@ impl<'a, V: Vector, const D: usize, const P: usize> Phases<'a, V, D, P> {
         if const { Self::IN_PARTS } {
             self.flush();
         }
-        self.total.finite()
     }
 
     /// R vectors from frame `first` on.

@@ -8,6 +8,8 @@ use super::kernel::{FirFn, FirKernel};
 use super::tiling::{FirJob, FrameChunk, SCRATCH, Tiling};
 use crate::aligned::Aligned;
 
+/// Segments of a call.
+const SEGMENTS: usize = 2;
 /// Samples of the outputs of one vector: 16 frames of 4 phases.
 const VECTOR_OUTPUTS: usize = 64;
 
@@ -32,6 +34,16 @@ struct PhaseGroup<T: SimdElement> {
     kernel: FirFn<T>,
 }
 
+/// Frames that lie one after another.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Segment<'a, T> {
+    /// From the history of the first frame on, see [`Tiling::history`].
+    pub(crate) x: &'a [T],
+    /// The frame of the output that is the first one.
+    pub(crate) first: usize,
+    pub(crate) frames: usize,
+}
+
 /// Its vectors are stored and loaded whole: across the border of a cache line that would take twice as long.
 #[repr(align(64))]
 struct Scratch<T>([T; SCRATCH]);
@@ -54,7 +66,7 @@ impl<T: SimdElement> Polyphase<T> {
         Self { tiling, ratio, groups: widths(ratio).map(group).collect() }
     }
 
-    /// Phase p of frame t of `frames` goes to `out[t M + p]`. The t-th frame begins at
+    /// Phase p of frame t goes to `out[t M + p]`. The t-th frame of a segment begins at
     /// `x[tiling.history + t * tiling.hop]`; frames past the last one, up to whole vectors, are read too and
     /// mean nothing.
     ///
@@ -63,60 +75,82 @@ impl<T: SimdElement> Polyphase<T> {
     /// that are not.
     ///
     /// # Panics
-    /// If `x` or `out` is too short for that.
-    pub(crate) fn run(&self, x: &[T], frames: usize, out: &mut [T]) -> bool {
-        let Tiling { history, hop, depth, vector, .. } = self.tiling;
-        let padded = (frames + vector - 1) & !(vector - 1);
-        assert!(history + padded * hop <= x.len() && frames * self.ratio <= out.len());
-        #[cfg(test)]
-        work::add(frames * self.tiling.steps * depth * self.ratio);
-        // All outputs are written through this one pointer, here and in the kernels. Of three phases the
-        // kernels write to the place after them too, so the last frame is left to `remainder`.
-        let chunk = FrameChunk {
-            x: x.as_ptr().wrapping_add(history + hop - depth),
-            out: out.as_mut_ptr(),
-            frames: frames.saturating_sub(usize::from(self.ratio == 3)) & !(vector - 1),
-        };
+    /// If a segment or `out` is too short for that, or if there are more than two segments.
+    pub(crate) fn run(&self, segments: &[Segment<'_, T>], out: &mut [T]) -> bool {
+        let (mut chunks, mut whole) = ([FrameChunk::NONE; SEGMENTS], true);
+        // All outputs are written through this one pointer, here and in the kernels.
+        let room = out.as_mut_ptr();
+        for (chunk, segment) in chunks[..segments.len()].iter_mut().zip(segments) {
+            *chunk = self.chunk(segment, room, out.len());
+            whole &= chunk.frames == segment.frames;
+            #[cfg(test)]
+            work::add(segment.frames * self.tiling.steps * self.tiling.depth * self.ratio);
+        }
         let mut scratch = std::mem::MaybeUninit::<Scratch<T>>::uninit();
         let mut finite = true;
         for group in &self.groups {
             let job = FirJob {
                 tiling: &self.tiling,
                 coefficients: group.coefficients.as_ptr(),
-                chunk,
+                chunks: &chunks[..segments.len()],
                 first: group.first,
                 out_hop: self.ratio,
                 scratch: scratch.as_mut_ptr().cast(),
             };
             // SAFETY: the coefficients were made for the kernel and the tiling, and all loads and stores lie
-            // within the bounds that are asserted above.
-            finite &= unsafe { (group.kernel)(&job) & remainder(group, &job, frames - chunk.frames) };
+            // within the bounds that `chunk` asserts.
+            finite &= unsafe { (group.kernel)(&job) };
+            if !whole {
+                for (chunk, segment) in chunks.iter().zip(segments) {
+                    // SAFETY: as above.
+                    finite &= unsafe { remainder(group, &job, chunk, segment, room) };
+                }
+            }
         }
         finite
     }
+
+    /// The whole vectors of a segment, and with three phases without its last frame: of three phases the
+    /// kernels write to the place after them too, which belongs to the same frame, to a later one, or to
+    /// none.
+    #[inline(always)]
+    fn chunk(&self, segment: &Segment<'_, T>, room: *mut T, len: usize) -> FrameChunk<T> {
+        let Segment { x, first, frames } = *segment;
+        let Tiling { history, hop, depth, vector, .. } = self.tiling;
+        let padded = (frames + vector - 1) & !(vector - 1);
+        assert!(history + padded * hop <= x.len() && (first + frames) * self.ratio <= len);
+        FrameChunk {
+            x: x.as_ptr().wrapping_add(history + hop - depth),
+            out: room.wrapping_add(first * self.ratio),
+            frames: frames.saturating_sub(usize::from(self.ratio == 3)) & !(vector - 1),
+        }
+    }
 }
 
-/// The frames, a vector at most, that are `left` of a chunk: all outputs of the vector go to scratch, and
-/// those that are wanted from there.
+/// The frames of a segment, a vector at most, that are left of its chunk: all outputs of the vector go to
+/// scratch, and those that are wanted from there.
 ///
 /// # Safety
-/// The job is that of a checked call.
-unsafe fn remainder<T: SimdElement>(group: &PhaseGroup<T>, job: &FirJob<'_, T>, left: usize) -> bool {
+/// The job, the chunk and the segment are those of a checked call, whose outputs begin at `room`.
+unsafe fn remainder<T: SimdElement>(
+    group: &PhaseGroup<T>,
+    job: &FirJob<'_, T>,
+    chunk: &FrameChunk<T>,
+    segment: &Segment<'_, T>,
+    room: *mut T,
+) -> bool {
+    let left = segment.frames - chunk.frames;
     if left == 0 {
         return true;
     }
-    let FrameChunk { x, out, frames } = job.chunk;
     let mut outputs = [T::default(); VECTOR_OUTPUTS];
     let hop = group.width.next_power_of_two();
-    let chunk = FrameChunk {
-        x: x.wrapping_add(frames * job.tiling.hop),
-        out: outputs.as_mut_ptr(),
-        frames: job.tiling.vector,
-    };
+    let x = chunk.x.wrapping_add(chunk.frames * job.tiling.hop);
+    let chunks = [FrameChunk { x, out: outputs.as_mut_ptr(), frames: job.tiling.vector }];
     // A vector has at most 16 frames, so the scratch holds them.
-    let finite = (group.kernel)(&FirJob { chunk, first: 0, out_hop: hop, ..*job });
+    let finite = (group.kernel)(&FirJob { chunks: &chunks, first: 0, out_hop: hop, ..*job });
     for (t, phases) in outputs.chunks_exact(hop).enumerate().take(left) {
-        let frame = out.add((frames + t) * job.out_hop);
+        let frame = room.add((segment.first + chunk.frames + t) * job.out_hop);
         frame.add(group.first).copy_from_nonoverlapping(phases.as_ptr(), group.width);
     }
     finite

@@ -28,13 +28,22 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
         Self { job, total: V::zero() }
     }
 
-    /// All frames, in blocks of as many as a group has lanes: their sums are added together.
+    /// All frames.
     ///
     /// # Safety
     /// As for [`Vector`]; the job's memory is there.
     #[inline(always)]
     pub(super) unsafe fn run(&mut self) -> bool {
-        let FirJob { tiling, scratch, chunk: FrameChunk { x, out, frames }, .. } = *self.job;
+        for chunk in self.job.chunks {
+            self.chunk(chunk);
+        }
+        self.total.finite()
+    }
+
+    /// Blocks of as many frames as a group has lanes: their sums are added together.
+    #[inline(always)]
+    unsafe fn chunk(&mut self, &FrameChunk { x, out, frames }: &FrameChunk<V::Sample>) {
+        let FirJob { tiling, scratch, .. } = *self.job;
         let pairing = tiling.pairing;
         // Vectors of a block in each of the tiles, and blocks at once: of twelve sums three blocks of 8 are
         // two tiles.
@@ -59,7 +68,6 @@ impl<'a, V: Vector, const D: usize> Single<'a, V, D> {
             first += blocks * V::GROUP;
             left -= blocks;
         }
-        self.total.finite()
     }
 
     /// Samples from vector to vector; a constant where D does not fill a group.

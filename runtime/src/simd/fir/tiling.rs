@@ -97,12 +97,16 @@ pub(super) struct FrameChunk<T> {
     pub(super) frames: usize,
 }
 
+impl<T> FrameChunk<T> {
+    pub(super) const NONE: Self = Self { x: std::ptr::null(), out: std::ptr::null_mut(), frames: 0 };
+}
+
 /// One call of a kernel, checked.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FirJob<'a, T> {
     pub(super) tiling: &'a Tiling,
     pub(super) coefficients: *const T,
-    pub(super) chunk: FrameChunk<T>,
+    pub(super) chunks: &'a [FrameChunk<T>],
     /// The first phase.
     pub(super) first: usize,
     pub(super) out_hop: usize,
