@@ -107,7 +107,7 @@ pub(super) fn table_fusion(job: &BankRun<'_>, table: &Path) -> Result<MovingFusi
         MergeError::Design(_) | MergeError::OwnRates => failed_at(job.bank_path, error),
         error => failed_at(table, error),
     })?;
-    Ok(MovingFusion::Table(TableFusion { fusion, levels, frames: 0 }))
+    Ok(MovingFusion::Table(Box::new(TableFusion { fusion, levels, frames: 0 })))
 }
 
 impl TableFusion {
@@ -128,7 +128,7 @@ pub(super) fn pilot_fusion(job: &BankRun<'_>, tone: Hertz) -> Result<MovingFusio
 
 /// What fuses while delays move.
 pub(super) enum MovingFusion {
-    Table(TableFusion),
+    Table(Box<TableFusion>),
     Pilot(Box<PilotFusion>),
 }
 
@@ -150,7 +150,8 @@ impl MovingFusion {
 
     fn finish(self) -> Result<Last, MergeError> {
         match self {
-            Self::Table(TableFusion { fusion, levels, .. }) => {
+            Self::Table(table) => {
+                let TableFusion { fusion, levels, .. } = *table;
                 let (samples, quality) = fusion.finish()?;
                 Ok(Last { samples, quality, levels: levels.as_ref().map(LevelTrack::change), warning: None })
             }
