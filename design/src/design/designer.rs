@@ -1,6 +1,7 @@
 //! The steps from a spec to a finished bank.
 
 use super::band_error::BandError;
+use super::deviations::Deviations;
 use super::limits::{Stage, Stop, TIME_LIMIT, remedy};
 use super::methods::robust_fir::RobustStudy;
 use super::methods::{self, MethodSettings, Synthesis};
@@ -125,7 +126,9 @@ pub fn design(spec: &Spec, options: &DesignOptions<'_>) -> Result<Design, Design
 /// the second has a better SNR.
 fn for_signal(spec: &Spec, options: &DesignOptions<'_>, stop: &Stop) -> Result<Design, DesignError> {
     let usual = designed(&filled_in(spec), options, stop)?;
-    let is_driven = matches!(spec.design.method, Method::Fir | Method::Iir);
+    // What is uncertain limits a bank before its band does.
+    let is_driven =
+        matches!(spec.design.method, Method::Fir | Method::Iir) && Deviations::uncertain(spec).is_empty();
     let Some(floor) = SignalFilter::sharp_floor(spec).filter(|_| is_driven) else { return Ok(usual) };
     let Some(error) = BandError::of(&usual.bank)?.filter(BandError::is_of_signal) else { return Ok(usual) };
     // A design that fails or does not end in time is no better.
