@@ -124,13 +124,13 @@ pub enum MergeError {
     },
     /// A pilot that has no phase of its own.
     #[error(
-        "the pilot at {tone} lies at a multiple of half the converters' rate of {}, where it folds onto its mirror image; \
+        "the pilot at {frequency} lies at a multiple of half the converters' rate of {}, where it folds onto its mirror image; \
          choose another frequency",
         readable(rate.0, "S/s")
     )]
     Pilot {
         /// Its frequency.
-        tone: Hertz,
+        frequency: Hertz,
         /// The rate of a converter.
         rate: Hertz,
     },

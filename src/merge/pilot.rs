@@ -7,9 +7,11 @@ use super::tracked::{DelayTrack, TrackedFusion};
 use crate::bank::Bank;
 use crate::calibrate::usual_reference;
 use crate::design::Problem;
+use crate::design::problem::Channel;
 use crate::linalg::Complex;
 use crate::sampling::LearnedCourse;
 use crate::sampling::nonuniform::Measured;
+use crate::sine_fit::Estimate;
 use crate::units::{FastPeriods, Hertz, Seconds};
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
@@ -28,26 +30,95 @@ const KEPT: usize = 4;
 #[derive(Debug)]
 pub struct PilotFusion {
     fusion: TrackedFusion,
-    fast_period: Seconds,
-    ratio: usize,
-    /// Cycles of the tone per sample, and its period.
-    cycles: f64,
-    period: FastPeriods,
-    /// What the front ends and gains make of it.
-    responses: Vec<Complex<f64>>,
-    reference: usize,
-    /// The delays now.
-    delays: Vec<FastPeriods>,
+    pilot: Pilot,
+    delays: Vec<MovingDelay>,
     /// Samples of each channel that are not fused yet.
     waiting: Vec<Vec<f64>>,
     /// The first frame of them, and that of the next block.
     first: usize,
     next: usize,
-    /// What the last blocks say of each channel.
-    readings: Vec<VecDeque<Measured>>,
     /// The delays in the middle of the last blocks.
     track: DelayTrack,
+    /// Blocks in which the tone was not heard.
     silent: usize,
+}
+
+/// The tone, as it reaches the samples.
+#[derive(Debug)]
+struct Pilot {
+    fast_period: Seconds,
+    ratio: usize,
+    frequency: Hertz,
+    /// What front ends and gains make of it.
+    responses: Vec<Complex<f64>>,
+    /// The channel whose delay stays.
+    reference: usize,
+}
+
+/// The delay of a channel now, and what the last blocks say of it.
+#[derive(Debug, Clone)]
+struct MovingDelay {
+    now: FastPeriods,
+    readings: VecDeque<Measured>,
+}
+
+impl Pilot {
+    fn new(bank: &Bank, frequency: Hertz) -> Result<Self, MergeError> {
+        let problem = Problem::of_bank(bank)?;
+        let w = frequency.angular().per_fast_period(bank.fast_period);
+        let response = |channel: &Channel| problem.response(channel.front_end, w) * channel.gain;
+        let pilot = Self {
+            fast_period: bank.fast_period,
+            ratio: bank.ratio,
+            frequency,
+            responses: problem.channels.iter().map(response).collect(),
+            reference: bank.spec.as_ref().map_or(0, usual_reference),
+        };
+        match Phasor::is_mirrored(pilot.cycles(), FRAMES) {
+            true => Err(MergeError::Pilot { frequency, rate: Hertz(1.0 / bank.slow_period().0) }),
+            false => Ok(pilot),
+        }
+    }
+
+    /// Per sample of a converter.
+    fn cycles(&self) -> f64 {
+        self.frequency.0 * self.fast_period.0 * self.ratio as f64
+    }
+
+    fn period(&self) -> FastPeriods {
+        FastPeriods(1.0 / (self.frequency.0 * self.fast_period.0))
+    }
+
+    /// By how much each channel is later than the reference in the middle of a block, up to whole periods;
+    /// `None` if the tone is not heard in all.
+    fn lags<'a>(&self, block: impl Iterator<Item = &'a [f64]>) -> Option<Vec<Estimate<FastPeriods>>> {
+        let heard: Vec<Phasor> = block.map(|part| Phasor::of(part, self.cycles())).collect::<Option<_>>()?;
+        let own = heard[self.reference];
+        let radian = self.period() * (1.0 / TAU);
+        let lag = |(phasor, response): (&Phasor, &Complex<f64>)| {
+            let turned = phasor.value / response * (own.value / self.responses[self.reference]).conj();
+            Estimate { value: radian * -turned.arg(), sigma: radian * phasor.deviation.hypot(own.deviation) }
+        };
+        Some(heard.iter().zip(&self.responses).map(lag).collect())
+    }
+
+    fn time_of(&self, frame: usize) -> Seconds {
+        self.fast_period * (frame * self.ratio) as f64
+    }
+}
+
+impl MovingDelay {
+    /// One more reading, known up to whole periods.
+    fn take(&mut self, frame: f64, found: Estimate<FastPeriods>, period: FastPeriods) {
+        let value = found.value.0 - ((found.value.0 - self.now.0) / period.0).round() * period.0;
+        self.readings.push_back(Measured { x: frame, value, error: found.sigma.0, jitter: 0.0 });
+        if self.readings.len() > READINGS {
+            self.readings.pop_front();
+        }
+        let course = LearnedCourse::new(self.readings.make_contiguous());
+        let course = course.filter(|_| self.readings.len() >= LEAST_READINGS);
+        self.now.0 = course.map_or(value, |course| course.at(frame).value);
+    }
 }
 
 impl PilotFusion {
@@ -58,30 +129,18 @@ impl PilotFusion {
     pub fn new(bank: &Bank, tone: Hertz) -> Result<Self, MergeError> {
         let delays = bank.delays.iter().map(|delay| vec![*delay]).collect();
         let track = DelayTrack { times: vec![Seconds(0.0)], delays, half_widths: Vec::new() };
-        let fusion = TrackedFusion::new(bank, &track)?;
-        let problem = Problem::of_bank(bank)?;
-        let w = tone.angular().per_fast_period(bank.fast_period);
-        let cycles = tone.0 * bank.slow_period().0;
-        if Phasor::is_mirrored(cycles, FRAMES) {
-            return Err(MergeError::Pilot { tone, rate: Hertz(1.0 / bank.slow_period().0) });
-        }
-        let channels = problem.channels.iter();
-        let responses =
-            channels.map(|channel| problem.response(channel.front_end, w) * channel.gain).collect();
-        let count = bank.channel_count();
+        let fusion = TrackedFusion::new(bank, &track)?.with_unknown_clocks();
+        let moving = |delay: &Seconds| MovingDelay {
+            now: delay.in_fast_periods(bank.fast_period),
+            readings: VecDeque::new(),
+        };
         Ok(Self {
             fusion,
-            fast_period: bank.fast_period,
-            ratio: bank.ratio,
-            cycles,
-            period: FastPeriods(1.0 / (tone.0 * bank.fast_period.0)),
-            responses,
-            reference: bank.spec.as_ref().map_or(0, usual_reference),
-            delays: bank.delays.iter().map(|delay| delay.in_fast_periods(bank.fast_period)).collect(),
-            waiting: vec![Vec::new(); count],
+            pilot: Pilot::new(bank, tone)?,
+            delays: bank.delays.iter().map(moving).collect(),
+            waiting: vec![Vec::new(); bank.channel_count()],
             first: 0,
             next: 0,
-            readings: vec![VecDeque::new(); count],
             track,
             silent: 0,
         })
@@ -135,45 +194,24 @@ impl PilotFusion {
 
     /// Adds the delays in the middle of the next block. Those of a silent one are those before.
     fn measure(&mut self) {
-        match self.next_block() {
-            Some(found) => found.into_iter().enumerate().for_each(|(i, reading)| self.take(i, reading)),
+        let (from, middle) = (self.next - self.first, self.next + FRAMES / 2);
+        match self.pilot.lags(self.waiting.iter().map(|samples| &samples[from..from + FRAMES])) {
+            Some(lags) => self.take(middle as f64, lags),
             None => self.silent += 1,
         }
+        // The first ones take the place of those of the bank.
         let keep = if self.next == 0 { 0 } else { KEPT };
-        let middle = FastPeriods(((self.next + FRAMES / 2) * self.ratio) as f64);
-        keep_last(&mut self.track.times, keep, middle.in_seconds(self.fast_period));
+        keep_last(&mut self.track.times, keep, self.pilot.time_of(middle));
         for (all, delay) in self.track.delays.iter_mut().zip(&self.delays) {
-            keep_last(all, keep, delay.in_seconds(self.fast_period));
+            keep_last(all, keep, delay.now.in_seconds(self.pilot.fast_period));
         }
     }
 
-    /// The delay of a channel by one more reading.
-    fn take(&mut self, channel: usize, mut reading: Measured) {
-        let (delay, readings) = (&mut self.delays[channel], &mut self.readings[channel]);
-        reading.value -= ((reading.value - delay.0) / self.period.0).round() * self.period.0;
-        readings.push_back(reading);
-        if readings.len() > READINGS {
-            readings.pop_front();
+    fn take(&mut self, frame: f64, lags: Vec<Estimate<FastPeriods>>) {
+        let (reference, period) = (self.delays[self.pilot.reference].now, self.pilot.period());
+        for (delay, lag) in self.delays.iter_mut().zip(lags) {
+            delay.take(frame, Estimate { value: reference + lag.value, ..lag }, period);
         }
-        let course = LearnedCourse::new(readings.make_contiguous());
-        let course = course.filter(|_| readings.len() >= LEAST_READINGS);
-        delay.0 = course.map_or(reading.value, |course| course.at(reading.x).value);
-    }
-
-    /// What the tone says of the delay of each channel in the next block; `None` if it is not heard in all.
-    fn next_block(&self) -> Option<Vec<Measured>> {
-        let from = self.next - self.first;
-        let part = |samples: &Vec<f64>| Phasor::of(&samples[from..from + FRAMES], self.cycles);
-        let heard: Vec<Phasor> = self.waiting.iter().map(part).collect::<Option<_>>()?;
-        let own = heard[self.reference];
-        let middle = (self.next + FRAMES / 2) as f64;
-        let delay = |(phasor, response): (&Phasor, &Complex<f64>)| {
-            let late = phasor.value / response * (own.value / self.responses[self.reference]).conj();
-            let value = self.delays[self.reference].0 - late.arg() * self.period.0 / TAU;
-            let error = phasor.deviation.hypot(own.deviation) * self.period.0 / TAU;
-            Measured { x: middle, value, error, jitter: 0.0 }
-        };
-        Some(heard.iter().zip(&self.responses).map(delay).collect())
     }
 }
 

@@ -70,12 +70,14 @@ impl TrackedFusion {
             &with_instants(bank, &track.half_widths),
             settings.longest(&recordings),
         )?;
-        let mut fusion = LiveFusion::new(estimator, recordings, settings.first, REACH);
-        if track.times.len() == 1 {
-            fusion = fusion.with_unknown_clocks();
-        }
+        let fusion = LiveFusion::new(estimator, recordings, settings.first, REACH);
         let course = InnerCourse::new(bank.fast_period * fusion.block() as f64);
         Ok(Self { fusion, bank: bank.clone(), frames: 0, course })
+    }
+
+    /// The same for delays that the table only begins with.
+    pub(super) fn with_unknown_clocks(self) -> Self {
+        Self { fusion: self.fusion.with_unknown_clocks(), ..self }
     }
 
     /// From now on the delays are those of another table: those of the one before, as far as there are

@@ -7,8 +7,9 @@ use super::problem::Problem;
 use super::responses::impulse_responses;
 use hybank_core::bank::Bank;
 
-/// The error from the signal limits nothing below this share of the noise: 0.04 dB.
-const NEGLIGIBLE: f64 = 0.01;
+/// The power by which a better bank errs less: half a decibel. Below this another one is not worth its
+/// design.
+const WORTHWHILE: f64 = 1.122;
 /// Samples that the filters see, at most: covariances of more take seconds.
 const MOST_SAMPLES: usize = 1024;
 
@@ -38,12 +39,17 @@ impl BandError {
         Ok(Some(Self { signal, noise: errors.noise_of(&taps, &noisy.noise) }))
     }
 
-    /// Whether the band limits the bank.
+    /// Whether the band limits the bank: without the error from the signal it would be better.
     pub(super) fn is_of_signal(&self) -> bool {
-        self.signal > NEGLIGIBLE * self.noise
+        self.total() > WORTHWHILE * self.noise
     }
 
-    pub(super) fn total(&self) -> f64 {
+    /// Whether this bank is better than another one.
+    pub(super) fn is_better_than(&self, other: &Self) -> bool {
+        WORTHWHILE * self.total() < other.total()
+    }
+
+    fn total(&self) -> f64 {
         self.signal + self.noise
     }
 }

@@ -133,7 +133,7 @@ fn for_signal(spec: &Spec, options: &DesignOptions<'_>, stop: &Stop) -> Result<D
     let Some(error) = BandError::of(&usual.bank)?.filter(BandError::is_of_signal) else { return Ok(usual) };
     // A design that fails or does not end in time is no better.
     let Ok(sharp) = designed(&with_floor(spec, floor), options, stop) else { return Ok(usual) };
-    let is_better = BandError::of(&sharp.bank)?.is_some_and(|other| other.total() < error.total());
+    let is_better = BandError::of(&sharp.bank)?.is_some_and(|other| other.is_better_than(&error));
     Ok(if is_better { sharp } else { usual })
 }
 
