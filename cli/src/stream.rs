@@ -76,7 +76,7 @@ pub(super) struct Args {
     /// Its phases in blocks of 2048 frames tell the delays, from those of the bank on; the samples come one
     /// and a half blocks later. Where it is not heard the delays stay, with a warning.
     #[arg(long, value_name = "F", value_parser = pilot, conflicts_with_all =
-          ["track", "algorithm", "gaps", "report", "threads"])]
+          ["track", "algorithm", "gaps", "report", "threads", "lost", "mask", "longest"])]
     pilot: Option<Hertz>,
     #[command(flatten)]
     run: RunArgs,

@@ -85,7 +85,7 @@ pub(super) fn course(pieces: impl Iterator<Item = (f64, Estimate<f64>)>, nominal
 
 /// Readings with the deviation that they scatter by, where they state far larger ones: a signal beside a
 /// tone counts as white noise there, and leaves the tone alone where it lies at other frequencies.
-fn by_scatter(readings: &[Measured]) -> Vec<Measured> {
+pub(crate) fn by_scatter(readings: &[Measured]) -> Vec<Measured> {
     // What a line through both neighbours leaves of one of three has the variance 3/2.
     let left = readings.windows(3).map(|three| {
         let beside = 0.5 * (three[0].value + three[2].value);

@@ -91,7 +91,7 @@ pub enum MergeError {
     },
     /// A bank whose converters have rates of their own.
     #[error(
-        "the converters of the bank have rates of their own; a table of delays is for converters of one rate"
+        "the converters of the bank have rates of their own; moving delays are followed for converters of one rate"
     )]
     OwnRates,
     /// A table of delays of other converters.
@@ -124,15 +124,17 @@ pub enum MergeError {
     },
     /// A pilot that has no phase of its own.
     #[error(
-        "the pilot at {frequency} lies at a multiple of half the converters' rate of {}, where it folds onto its mirror image; \
-         choose another frequency",
-        readable(rate.0, "S/s")
+        "the pilot at {frequency} lies too near to a multiple of half the converters' rate of {}, where it meets its mirror \
+         image; choose a frequency that is {} or more away from these",
+        readable(rate.0, "S/s"), readable(apart.0, "Hz")
     )]
     Pilot {
         /// Its frequency.
         frequency: Hertz,
         /// The rate of a converter.
         rate: Hertz,
+        /// How far away it must be.
+        apart: Hertz,
     },
     /// The converters of a bank are not known.
     #[error(transparent)]

@@ -1,13 +1,14 @@
 //! The phase of a tone in a block of samples, beside whatever signal.
 
 use crate::linalg::Complex;
-use std::f64::consts::{PI, TAU};
+use crate::sampling::median;
+use std::f64::consts::{LN_2, PI, TAU};
 use std::ops::RangeInclusive;
 
 /// Coefficients of the window: what is more than four bins away leaks by -92 dB (F. J. Harris, *On the use
 /// of windows for harmonic analysis with the discrete Fourier transform*, Proc. IEEE 66, 1978).
 const BLACKMAN_HARRIS: [f64; 4] = [0.35875, -0.48829, 0.14128, -0.01168];
-/// Bins away from the tone whose mean power is that of the signal below it: beyond the main lobe.
+/// Bins away from the tone whose median power is that of the signal below it: beyond the main lobe.
 const BESIDE: RangeInclusive<i32> = 6..=10;
 /// Power of a tone that is heard over that of what lies beside it.
 const LEAST_RATIO: f64 = 50.0;
@@ -24,12 +25,13 @@ pub(super) struct Phasor {
 impl Phasor {
     /// Of a tone of so many cycles per sample; lost samples are NaN. `None` if it is not heard.
     pub(super) fn of(samples: &[f64], cycles: f64) -> Option<Self> {
-        let windowed: Vec<f64> =
-            samples.iter().zip(window(samples.len())).map(|(x, w)| usable(*x) * w).collect();
+        let whole = bridged(samples)?;
+        let windowed: Vec<f64> = whole.iter().zip(window(samples.len())).map(|(x, w)| x * w).collect();
         let bin = 1.0 / samples.len() as f64;
         let at = |bins: i32| correlation(&windowed, cycles + bin * f64::from(bins));
-        let beside: Vec<f64> = BESIDE.flat_map(|k| [at(-k), at(k)]).map(|x| x.norm_sqr()).collect();
-        let (value, power) = (at(0), beside.iter().sum::<f64>() / beside.len() as f64);
+        let beside = BESIDE.flat_map(|k| [at(-k), at(k)]).map(|x| x.norm_sqr()).collect();
+        // Powers of noise have an exponential law, whose median is ln 2 of its mean.
+        let (value, power) = (at(0), median(beside) / LN_2);
         let deviation = (0.5 * power / value.norm_sqr()).sqrt();
         (value.norm_sqr() > LEAST_RATIO * power).then_some(Self { value, deviation })
     }
@@ -37,13 +39,29 @@ impl Phasor {
     /// Whether a tone and its mirror image are so close to each other in the spectrum of `count` samples
     /// that neither has a phase of its own.
     pub(super) fn is_mirrored(cycles: f64, count: usize) -> bool {
-        let apart = (2.0 * cycles - (2.0 * cycles).round()).abs();
-        apart * (count as f64) < f64::from(2 * *BESIDE.end())
+        (2.0 * cycles - (2.0 * cycles).round()).abs() < 2.0 * Self::least_distance(count)
+    }
+
+    /// How far a tone is from multiples of half the rate at least, in cycles per sample.
+    pub(super) fn least_distance(count: usize) -> f64 {
+        f64::from(*BESIDE.end()) / count as f64
     }
 }
 
-fn usable(x: f64) -> f64 {
-    if x.is_finite() { x } else { 0.0 }
+/// The samples with lines over those that are lost; `None` if more than an eighth are.
+fn bridged(samples: &[f64]) -> Option<Vec<f64>> {
+    let there: Vec<usize> = (0..samples.len()).filter(|&n| samples[n].is_finite()).collect();
+    if 8 * there.len() < 7 * samples.len() {
+        return None;
+    }
+    let mut whole = samples.to_vec();
+    whole[..there[0]].fill(samples[there[0]]);
+    whole[there[there.len() - 1]..].fill(samples[there[there.len() - 1]]);
+    for ends in there.windows(2) {
+        let step = (samples[ends[1]] - samples[ends[0]]) / (ends[1] - ends[0]) as f64;
+        (ends[0] + 1..ends[1]).for_each(|n| whole[n] = samples[ends[0]] + step * (n - ends[0]) as f64);
+    }
+    Some(whole)
 }
 
 fn window(count: usize) -> impl Iterator<Item = f64> {

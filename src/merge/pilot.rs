@@ -5,7 +5,7 @@ use super::error::MergeError;
 use super::phasor::Phasor;
 use super::tracked::{DelayTrack, TrackedFusion};
 use crate::bank::Bank;
-use crate::calibrate::usual_reference;
+use crate::calibrate::{by_scatter, usual_reference};
 use crate::design::Problem;
 use crate::design::problem::Channel;
 use crate::linalg::Complex;
@@ -51,6 +51,8 @@ struct Pilot {
     frequency: Hertz,
     /// What front ends and gains make of it.
     responses: Vec<Complex<f64>>,
+    /// The offsets of the converters, which would leak into a low tone.
+    offsets: Vec<f64>,
     /// The channel whose delay stays.
     reference: usize,
 }
@@ -59,6 +61,8 @@ struct Pilot {
 #[derive(Debug, Clone)]
 struct MovingDelay {
     now: FastPeriods,
+    /// What it is a block later, by its course.
+    later: FastPeriods,
     readings: VecDeque<Measured>,
 }
 
@@ -72,10 +76,14 @@ impl Pilot {
             ratio: bank.ratio,
             frequency,
             responses: problem.channels.iter().map(response).collect(),
+            offsets: bank.offsets.clone(),
             reference: bank.spec.as_ref().map_or(0, usual_reference),
         };
         match Phasor::is_mirrored(pilot.cycles(), FRAMES) {
-            true => Err(MergeError::Pilot { frequency, rate: Hertz(1.0 / bank.slow_period().0) }),
+            true => {
+                let rate = Hertz(1.0 / bank.slow_period().0);
+                Err(MergeError::Pilot { frequency, rate, apart: rate * Phasor::least_distance(FRAMES) })
+            }
             false => Ok(pilot),
         }
     }
@@ -92,7 +100,11 @@ impl Pilot {
     /// By how much each channel is later than the reference in the middle of a block, up to whole periods;
     /// `None` if the tone is not heard in all.
     fn lags<'a>(&self, block: impl Iterator<Item = &'a [f64]>) -> Option<Vec<Estimate<FastPeriods>>> {
-        let heard: Vec<Phasor> = block.map(|part| Phasor::of(part, self.cycles())).collect::<Option<_>>()?;
+        let heard = |(part, offset): (&[f64], &f64)| {
+            let own: Vec<f64> = part.iter().map(|x| x - offset).collect();
+            Phasor::of(&own, self.cycles())
+        };
+        let heard: Vec<Phasor> = block.zip(&self.offsets).map(heard).collect::<Option<_>>()?;
         let own = heard[self.reference];
         let radian = self.period() * (1.0 / TAU);
         let lag = |(phasor, response): (&Phasor, &Complex<f64>)| {
@@ -115,9 +127,11 @@ impl MovingDelay {
         if self.readings.len() > READINGS {
             self.readings.pop_front();
         }
-        let course = LearnedCourse::new(self.readings.make_contiguous());
+        let course = LearnedCourse::new(&by_scatter(self.readings.make_contiguous()));
         let course = course.filter(|_| self.readings.len() >= LEAST_READINGS);
-        self.now.0 = course.map_or(value, |course| course.at(frame).value);
+        self.now.0 = course.as_ref().map_or(value, |course| course.at(frame).value);
+        // At the end of the samples the course goes on as it was.
+        self.later.0 = course.map_or(value, |course| course.at(frame + FRAMES as f64).value);
     }
 }
 
@@ -130,9 +144,9 @@ impl PilotFusion {
         let delays = bank.delays.iter().map(|delay| vec![*delay]).collect();
         let track = DelayTrack { times: vec![Seconds(0.0)], delays, half_widths: Vec::new() };
         let fusion = TrackedFusion::new(bank, &track)?.with_unknown_clocks();
-        let moving = |delay: &Seconds| MovingDelay {
-            now: delay.in_fast_periods(bank.fast_period),
-            readings: VecDeque::new(),
+        let moving = |delay: &Seconds| {
+            let now = delay.in_fast_periods(bank.fast_period);
+            MovingDelay { now, later: now, readings: VecDeque::new() }
         };
         Ok(Self {
             fusion,
@@ -178,6 +192,11 @@ impl PilotFusion {
     /// # Errors
     /// As [`TrackedFusion::finish`].
     pub fn finish(mut self) -> Result<(Vec<f64>, PredictedQuality), MergeError> {
+        if self.next > 0 {
+            let later = self.delays.iter().map(|delay| delay.later).collect::<Vec<_>>();
+            self.add(self.next + FRAMES / 2, KEPT, &later);
+            self.fusion.follow(&self.track)?;
+        }
         let mut outputs = self.fuse_up_to(usize::MAX)?;
         let (last, quality) = self.fusion.finish()?;
         outputs.extend(last);
@@ -201,9 +220,15 @@ impl PilotFusion {
         }
         // The first ones take the place of those of the bank.
         let keep = if self.next == 0 { 0 } else { KEPT };
-        keep_last(&mut self.track.times, keep, self.pilot.time_of(middle));
-        for (all, delay) in self.track.delays.iter_mut().zip(&self.delays) {
-            keep_last(all, keep, delay.now.in_seconds(self.pilot.fast_period));
+        let now = self.delays.iter().map(|delay| delay.now).collect::<Vec<_>>();
+        self.add(middle, keep, &now);
+    }
+
+    /// Adds the delays at a frame to the last ones.
+    fn add(&mut self, frame: usize, keep: usize, delays: &[FastPeriods]) {
+        keep_last(&mut self.track.times, keep, self.pilot.time_of(frame));
+        for (all, delay) in self.track.delays.iter_mut().zip(delays) {
+            keep_last(all, keep, delay.in_seconds(self.pilot.fast_period));
         }
     }
 

@@ -4,13 +4,17 @@
 //! The Kalman filter of the lifted plant has the error z~ of the references with the measurements up to now.
 //! Each further slow period gives innovations of covariance R that are correlated with z~, and the smoothed
 //! error falls by `E[z~ e'] R^-1 E[e z~']` (Kailath, Sayed and Hassibi, *Linear Estimation*, 2000, chapter
-//! 10). So one Riccati equation gives the errors of all latencies.
+//! 10). So one Riccati equation gives the errors of all latencies: as the error of the noncausal filter and
+//! what the periods beyond still lower it by. Differences of larger squares would lose it in rounding.
 
 use super::DesignError;
 use super::methods::filtering::Innovations;
 use super::plant::LiftedPlant;
 use super::problem::Problem;
+use super::quadrature::{Integrand, QuadratureNode};
+use super::signal::SampledSignal;
 use hybank_core::spec::{MAX_ERROR_STATES, MAX_LATENCY};
+use hybank_linalg::{CMat, Complex};
 
 /// A longer latency is chosen only if it lowers the whole error by more than 0.1 dB: less than the error of
 /// a measured SNR, while the last tenth of a decibel may take many times the latency.
@@ -46,8 +50,8 @@ impl CausalErrors {
         let plant = LiftedPlant::new(&problem).with_noise();
         let periods = (most - first) / ratio + 1;
         let least = (delay.saturating_sub(first)).div_ceil(ratio) + LEAST_PERIODS;
-        let forms = Innovations::in_all_coordinates(&plant)?;
-        let squares = forms.iter().find_map(|form| form.smoothed(least..=periods, NEGLIGIBLE_SHARE));
+        let (forms, limits) = (Innovations::in_all_coordinates(&plant)?, noncausal_squares(&problem));
+        let squares = forms.iter().find_map(|form| form.smoothed(least..=periods, &limits, NEGLIGIBLE_SHARE));
         let states = plant.system().order();
         let squares = squares.ok_or(DesignError::RiccatiFailed { gamma: None, states })?;
         let at = |latency: usize| {
@@ -81,6 +85,30 @@ impl CausalErrors {
         let least = self.least();
         self.first + self.rms.iter().position(|rms| is_almost(*rms, least)).unwrap_or(0)
     }
+}
+
+/// The least mean square of each phase that all samples of all times leave, the spectrum of the signal being
+/// |W|^2: at each frequency the rest of the references beside all that the samples are made of, signal and
+/// noise.
+fn noncausal_squares(problem: &Problem) -> Vec<f64> {
+    let problem = Problem { band: None, ..problem.clone() };
+    let signal = SampledSignal::of(&problem);
+    let periods = 1.0 + (problem.longest_delay().0 + problem.latency as f64) / problem.ratio as f64;
+    let nodes = Integrand { breaks: signal.breaks(), periods, poles: &signal.poles() }.nodes();
+    let deviations = problem.noise.iter().map(|power| Complex::from(power.sqrt()));
+    let noise = CMat::from_diagonal(&deviations.collect::<Vec<_>>().into());
+    let mut squares = vec![0.0; problem.ratio];
+    for QuadratureNode { theta, share } in nodes {
+        let columns = signal.at(theta);
+        let (_, basis) = hybank_linalg::lq(&hybank_linalg::hstack(&[&columns.measurement, &noise]));
+        let reference = columns.reference.resize_horizontally(basis.ncols(), Complex::ZERO);
+        let rest = &reference - &reference * basis.adjoint() * &basis;
+        squares
+            .iter_mut()
+            .zip(rest.row_iter())
+            .for_each(|(square, row)| *square += share * row.norm_squared());
+    }
+    squares
 }
 
 /// Whether an error is within [`WORTHWHILE_DB`] of the least one.

@@ -254,11 +254,12 @@ impl Innovations {
 
     /// Mean squares of the errors of the references with the measurements up to their own slow period, and
     /// with those of `periods.start()` to `periods.end()` further ones: it ends where the second half of
-    /// them lowered no square by more than the share `negligible`. `None` if the Riccati equation could not
-    /// be solved.
+    /// them lowered no square by more than the share `negligible` of `limits`, those with all measurements.
+    /// `None` if the Riccati equation could not be solved.
     pub(in crate::design) fn smoothed(
         &self,
         periods: RangeInclusive<usize>,
+        limits: &[f64],
         negligible: f64,
     ) -> Option<Vec<Vec<f64>>> {
         let p = self.mean_square_covariance()?;
@@ -267,24 +268,26 @@ impl Innovations {
         let pc = &p * hybank_linalg::solve_lower(&root, &self.c2).transpose();
         let unit = hybank_linalg::solve_lower(&root, &self.c2);
         let mut gain = &self.c1 * &pc;
-        let prior =
-            |k: usize| (self.c1.row(k) * &p * self.c1.row(k).transpose())[0] + self.y.row(k).norm_squared();
-        let mut squares: Vec<f64> =
-            (0..self.c1.nrows()).map(|k| prior(k) - gain.row(k).norm_squared()).collect();
         // Of the errors of the references with that of the state.
         let mut cross =
             (&self.c1 * &p - &gain * pc.transpose()) * self.f.transpose() + &self.y * self.b2.transpose();
-        let mut all = vec![squares.clone()];
+        let lowered = |gain: &Mat| gain.row_iter().map(|row| row.norm_squared()).collect::<Vec<f64>>();
+        let mut steps: Vec<Vec<f64>> = Vec::new();
         for period in 1..=*periods.end() {
             gain = &cross * unit.transpose();
-            squares.iter_mut().zip(gain.row_iter()).for_each(|(square, row)| *square -= row.norm_squared());
-            all.push(squares.clone());
-            let is_settled = |(before, after): (&f64, &f64)| before - after <= negligible * after;
-            if period > *periods.start() && all[period / 2].iter().zip(&squares).all(is_settled) {
+            steps.push(lowered(&gain));
+            let last = |k: usize| steps[period / 2..].iter().map(|step| step[k]).sum::<f64>();
+            if period > *periods.start() && (0..limits.len()).all(|k| last(k) <= negligible * limits[k]) {
                 break;
             }
             cross = (cross - &gain * pc.transpose()) * self.f.transpose();
         }
+        let mut all = vec![limits.to_vec()];
+        for step in steps.iter().rev() {
+            let after = &all[all.len() - 1];
+            all.push(after.iter().zip(step).map(|(square, step)| square + step).collect());
+        }
+        all.reverse();
         Some(all)
     }
 

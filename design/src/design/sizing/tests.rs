@@ -133,6 +133,22 @@ fn the_latency_is_that_of_the_least_error() {
 }
 
 /// With much noise waiting for later samples brings little.
+/// Also where the least error is far below what the rounding of its parts resolves.
+#[test]
+fn recursive_banks_wait_longer_with_more_bits() {
+    let latency = |bits: u32| {
+        let text = format!(
+            "fast_rate = 48000\nratio = 2\nsignal = {{ band = 18000 }}\n\
+             target = {{ filter = {{ family = \"butterworth\", order = 4, cutoff = 14000 }} }}\n\
+             channel = [{{ delay = 0, bits = {bits} }}, {{ delay = \"18.75 us\", bits = {bits} }}]\n\
+             design = {{ method = \"iir\" }}"
+        );
+        Sizing::of(&Spec::from_toml(&text, "spec.toml").unwrap()).unwrap().latency
+    };
+    let all = [12, 16, 20, 24].map(latency);
+    assert!(all.is_sorted() && all[0] >= 8 && all[3] > all[1], "{all:?}");
+}
+
 #[test]
 fn recursive_banks_wait_less_where_there_is_noise() {
     let chosen = |design: &str| latency(&spec(design)).unwrap();
