@@ -56,6 +56,9 @@ fn every_separator_and_heading_gives_the_same_frames() {
     }
 }
 
+/// Its name, what stands before the rows, and its row of this number.
+type Instrument = (&'static str, &'static str, fn(u32) -> String);
+
 /// Files as instruments write them, by hand after their manuals: 20 lines at 1 MS/s, two channels.
 fn instruments() -> Vec<(&'static str, String)> {
     fn seconds(k: u32) -> f64 {
@@ -64,7 +67,7 @@ fn instruments() -> Vec<(&'static str, String)> {
     fn scientific(k: u32) -> String {
         format!("{:.6e},{}.5,-0.25", seconds(k), k % 3)
     }
-    let list: [(&str, &str, fn(u32) -> String); 12] = [
+    let list: [Instrument; 12] = [
         ("Keysight", "x-axis,1,2\nsecond,Volt,Volt\n", scientific),
         (
             "Tektronix",
