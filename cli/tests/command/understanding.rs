@@ -192,8 +192,9 @@ fn the_error_of_a_model_is_carried_into_the_uncertainty() {
     desk.write("late.toml", AUDIO.replace(family, filter));
     // The measurement that a spec names is an input, too.
     let before = desk.read("late.csv");
-    let over = ["design", "late.toml", "-o", "./late.csv", "--force"];
-    desk.refused(1, &over, &["./late.csv: it is also the input"]);
+    let output = desk.run(&["design", "late.toml", "-o", "./late.csv", "--force"], &[]);
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    assert!(text(&output.stderr).contains("./late.csv: it is also the input"), "{output:?}");
     assert_eq!(desk.read("late.csv"), before);
     desk.warned(&["design", "late.toml", "-o", "late.json"], &[]);
 }
