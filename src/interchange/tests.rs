@@ -90,14 +90,12 @@ fn circuits_that_cannot_be_are_refused() {
     };
     assert!(matches!(circuit(&fir(), "b", Some(8), None), Err(ExportError::NoIntegers { .. })));
     assert!(matches!(circuit(&bank, "b", None, None), Err(ExportError::NoInputBits)));
+    let named = |name: &str| circuit(&bank, name, Some(8), None);
     for name in ["wire", "1a", "a b"] {
-        assert!(matches!(circuit(&bank, name, Some(8), None), Err(ExportError::Name { .. })), "{name}");
+        assert!(matches!(named(name), Err(ExportError::Name { .. })), "{name}");
     }
     for name in ["x1", "clk", "sum1"] {
-        assert!(
-            matches!(circuit(&bank, name, Some(8), None), Err(ExportError::NameOfSignal { .. })),
-            "{name}"
-        );
+        assert!(matches!(named(name), Err(ExportError::NameOfSignal { .. })), "{name}");
     }
     let narrow = circuit(&bank, "b", Some(8), Some(2));
     assert!(matches!(narrow, Err(ExportError::NothingLeft { accumulator: 2, fraction_bits: 2, .. })));

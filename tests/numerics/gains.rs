@@ -159,10 +159,8 @@ fn gains_twelve_decades_apart_change_no_gamma() {
         };
         for ((plain, taps), gain) in plain.iter().zip(taps).zip(gains) {
             let size = plain.iter().fold(0.0f64, |most, tap| most.max(tap.abs()));
-            assert!(
-                plain.iter().zip(taps).all(|(a, b)| (a - b * gain).abs() < 1e-6 * size),
-                "{gain}: {taps:?}"
-            );
+            let is_undone = |(a, b): (&f64, &f64)| (a - b * gain).abs() < 1e-6 * size;
+            assert!(plain.iter().zip(taps).all(is_undone), "{gain}: {taps:?}");
         }
     }
 }

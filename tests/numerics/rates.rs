@@ -25,12 +25,8 @@ fn spec(design: &str) -> Spec {
 /// gamma, its proof, and the mean error of each method are those of five channels of one rate.
 #[test]
 fn a_bank_for_unequal_rates_is_one_for_all_samples_of_a_frame() {
-    for table in [
-        "design = { method = \"fir\", taps = 24 }",
-        "design = { method = \"iir\" }",
-        "design = { method = \"h2\" }",
-    ] {
-        let own = spec(table);
+    for table in ["\"fir\", taps = 24", "\"iir\"", "\"h2\""] {
+        let own = spec(&format!("design = {{ method = {table} }}"));
         assert_eq!((own.ratio, own.layout().samples().to_vec(), own.wait()), (6, vec![3, 2], 4));
         let by_hand = own.per_sample();
         assert_eq!((by_hand.channels.len(), by_hand.wait()), (5, 0));

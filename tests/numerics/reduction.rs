@@ -157,9 +157,8 @@ fn nasty_front_ends_end_as_banks_of_that_order() {
     // One order each, in turn, unless all are asked for.
     let all = trials::is_slow("order reduction: all orders of each case");
     for (case, spec) in cases.into_iter().enumerate() {
-        for order in
-            [0, 1, 3].into_iter().enumerate().filter(|(k, _)| all || case % 3 == *k).map(|(_, order)| order)
-        {
+        let orders = [0, 1, 3].into_iter().enumerate().filter(|(k, _)| all || case % 3 == *k);
+        for (_, order) in orders {
             let found = reduced(spec.clone(), Method::Iir, Reduction::Order(order));
             let states = block(&found.bank).a.len();
             let gamma = found.bank.gamma;

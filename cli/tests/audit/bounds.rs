@@ -106,10 +106,9 @@ pub(crate) fn causal(plant: &Plant, periods: i64) -> f64 {
         let all = (0..rows.len()).flat_map(|a| (0..periods).map(move |k| (a, k)));
         all.filter(|(a, k)| &rows[*a].time + real(plant.ratio as f64 * *k as f64) > zero).collect()
     };
-    let of = |rows: &'_ [Row]| samples(rows);
     let (targets, channels) = plant.rows.split_at(plant.ratio);
     let made = |rows: &[Row], offset: usize| -> Vec<Sample<'_>> {
-        of(rows).iter().map(|(a, k)| Sample::new(plant, &plant.rows[offset + a], *k)).collect()
+        samples(rows).iter().map(|(a, k)| Sample::new(plant, &plant.rows[offset + a], *k)).collect()
     };
     let (targets, channels) = (made(targets, 0), made(channels, plant.ratio));
     let row = |a: &Sample<'_>, list: &[Sample<'_>]| list.iter().map(|b| a.with(b)).collect::<Vec<_>>();
@@ -132,12 +131,8 @@ pub(crate) fn causal(plant: &Plant, periods: i64) -> f64 {
         let whole = targets[p].with(&targets[q]).re;
         C64::new(double(&pairs.fold(whole, |sum, (x, y)| sum - x * y)), 0.0)
     };
-    let lower_half =
-        DMatrix::from_fn(
-            targets.len(),
-            targets.len(),
-            |p, q| if p >= q { entry(p, q) } else { C64::default() },
-        );
-    let square = DMatrix::from_fn(targets.len(), targets.len(), |p, q| lower_half[(p.max(q), p.min(q))]);
+    let n = targets.len();
+    let lower_half = DMatrix::from_fn(n, n, |p, q| if p >= q { entry(p, q) } else { C64::default() });
+    let square = DMatrix::from_fn(n, n, |p, q| lower_half[(p.max(q), p.min(q))]);
     largest(square)
 }

@@ -190,9 +190,8 @@ fn boxed(seed: u64) -> Result<Tally, Tally> {
         tally.refuted.push(format!("{name}, {half:?}: attained {lower:e}, there {attained:e}"));
     }
     if found.gain > upper {
-        tally
-            .refuted
-            .push(format!("{name}, {half:?}: bound {upper:e}, found {:e} at {:?}", found.gain, found.errors));
+        let found = format!("found {:e} at {:?}", found.gain, found.errors);
+        tally.refuted.push(format!("{name}, {half:?}: bound {upper:e}, {found}"));
     }
     tally.widths.push(upper / lower - 1.0);
     tally.excesses.push(found.gain / lower - 1.0);
@@ -247,15 +246,13 @@ fn uncertain(seed: u64) -> Result<Tally, Tally> {
     let half = errors_of(&study["errors"], 1.0);
     let mut search = Search { bank: &bank, half: &half, library: Library::default() };
     let found = search.run(None, &mut dice);
-    let stated = at(&bank, "/gamma/worst_case");
-    match stated {
+    let there = format!("found {:e} at {:?}", found.gain, found.errors);
+    match at(&bank, "/gamma/worst_case") {
         None => tally.unproven.push(format!("{name}: no worst case is stated; found {:e}", found.gain)),
         Some(stated) => {
             tally.widths.push(stated / found.gain - 1.0);
             if found.gain > stated {
-                tally
-                    .refuted
-                    .push(format!("{name}: stated {stated:e}, found {:e} at {:?}", found.gain, found.errors));
+                tally.refuted.push(format!("{name}: stated {stated:e}, {there}"));
             }
         }
     }
@@ -263,9 +260,7 @@ fn uncertain(seed: u64) -> Result<Tally, Tally> {
     if let Some(printed) = printed
         && found.gain > printed * (1.0 + SEARCH)
     {
-        tally
-            .notes
-            .push(format!("{name}: printed {printed:e}, found {:e} at {:?}", found.gain, found.errors));
+        tally.notes.push(format!("{name}: printed {printed:e}, {there}"));
     }
     let count = bank["channels"][0]["taps"].as_array().map_or(0, Vec::len);
     if let Some(other) = robust_taps(&bank, &half, count, &mut dice) {

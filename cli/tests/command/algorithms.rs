@@ -66,10 +66,7 @@ fn fuse_takes_the_faster_form_and_gives_the_same_samples() {
         let extra = plan["extra_latency"].as_u64().unwrap();
         assert_eq!(report["latency_dropped"], extra + if latency.is_empty() { 7 } else { 0 });
         assert!(plan["multiply_adds"].as_f64().unwrap() < 200.0, "{plan}");
-        assert_eq!(
-            (&report["replaced"], &plan["algorithm"]),
-            (&Value::from(21), &Value::from("overlap-save"))
-        );
+        assert!(report["replaced"] == 21 && plan["algorithm"] == "overlap-save", "{report}");
         assert_eq!(of("auto").1["plan"], *plan);
         assert_eq!(of("auto").0, blocks);
     }
@@ -82,10 +79,7 @@ fn fuse_takes_the_faster_form_and_gives_the_same_samples() {
 fn stream_is_late_only_when_asked_to_be() {
     let desk = desk();
     let (direct, report) = stream(&desk, &["--flush", "--algorithm", "direct"]);
-    assert_eq!(
-        (&report["plan"]["algorithm"], &report["plan"]["extra_latency"]),
-        (&"direct".into(), &0.into())
-    );
+    assert!(report["plan"]["algorithm"] == "direct" && report["plan"]["extra_latency"] == 0, "{report}");
     assert_eq!(stream(&desk, &["--flush"]).0, direct);
     assert_eq!(stream(&desk, &[]).0, direct[..2 * COUNT]);
     let (blocks, report) = stream(&desk, &["--flush", "--algorithm", "overlap-save"]);

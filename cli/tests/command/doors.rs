@@ -1,6 +1,6 @@
 //! What instruments and converters write, in its own scale: element types, codes in wider words, I and Q.
 
-use crate::support::{Desk, wav};
+use crate::support::{Desk, wav, words};
 use hybank::bank::{Bank, SynthesisFilters};
 use serde_json::Value;
 
@@ -56,8 +56,7 @@ fn words_with_unused_bits_draw_a_warning_and_codes_beyond_are_refused() {
     let (samples, warnings) = fused(&desk, &["codes.raw", "--format", "s16le"]);
     assert_eq!(samples[5], codes[5] as f32 / 32768.0);
     assert!(warnings.len() == 1 && warnings[0].contains("12bits of words of 16"), "{warnings:?}");
-    let refused =
-        ["fuse", "turns.json", "codes.raw", "-o", "x.wav", "--interleaved", "2", "--format", "s16le"];
+    let refused = words("fuse turns.json codes.raw -o x.wav --interleaved 2 --format s16le");
     let parts = ["codes.raw: frame", "beyond a full scale of 10bits"];
     desk.refused(1, &[&refused[..], &["--full-scale", "10bits"]].concat(), &parts);
 }

@@ -69,11 +69,8 @@ fn streams_that_fail_before_their_first_sample_leave_nothing() {
     ] {
         let output = shell(&desk, &format!("$H stream bank.json {args}"));
         assert_eq!(output.status.code(), Some(1), "{args}: {output:?}");
-        assert!(
-            !names(&desk.path("")).iter().any(|name| name.contains("out.")),
-            "{args}: {:?}",
-            names(&desk.path(""))
-        );
+        let there = names(&desk.path(""));
+        assert!(!there.iter().any(|name| name.contains("out.")), "{args}: {there:?}");
     }
 }
 

@@ -128,8 +128,7 @@ fn flac_recordings_are_captures() {
     let report = desk.report(&["fuse", "bank.json", "two.flac", "-o", "y.wav", "--keep-latency"]);
     assert_eq!(report["samples"], 6000);
     assert!(wav::read(&desk.path("y.wav")).1 == fused(&input));
-    let page = desk.run(&["fuse", "bank.json", "two.flac", "-o", "y.flac"], &[]);
-    assert_eq!(page.status.code(), Some(2));
+    desk.refused(2, &["fuse", "bank.json", "two.flac", "-o", "y.flac"], &[]);
 }
 
 /// Complex frames of two channels, and their real and imaginary parts as real frames.
@@ -228,9 +227,7 @@ fn full_scale_of_tables_is_stated_or_warned_of() {
         assert!(found["offset"]["value"].as_f64().unwrap().abs() < 1e-3, "{args:?}");
     }
     for (file, scale) in [("signed.txt", "8bits"), ("unsigned.dat", "u8bits")] {
-        let run = desk.run(&["measure", "--rate", "1MHz", file], &[]);
-        let warning = text(&run.stderr);
-        assert!(warning.contains(file) && warning.contains(&format!("full scale of {scale}")), "{warning}");
+        desk.warned(&["measure", "--rate", "1MHz", file], &[file, &format!("full scale of {scale}")]);
     }
 }
 

@@ -24,10 +24,8 @@ fn scale_bank(desk: &Desk, fast_period: f64, scale: f64) {
 /// standard output.
 fn quietly(desk: &Desk, args: &[&str]) {
     let said = desk.good(args);
-    assert!(
-        said.is_empty() || said.lines().count() == 2 && said.contains(" samples at "),
-        "{args:?}: {said}"
-    );
+    let is_told = said.lines().count() == 2 && said.contains(" samples at ");
+    assert!(said.is_empty() || is_told, "{args:?}: {said}");
 }
 
 /// Runs and wants exit code 1 with a message of one line.

@@ -38,9 +38,8 @@ fn until(lines: &Receiver<String>, part: &str) -> Vec<String> {
     found
 }
 
-fn json_lines(text: &[u8]) -> Vec<Value> {
-    let text = String::from_utf8(text.to_vec()).unwrap();
-    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+fn json_lines(bytes: &[u8]) -> Vec<Value> {
+    text(bytes).lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
 #[test]

@@ -40,11 +40,8 @@ fn what_cannot_be_merged_is_refused() {
     desk.write("back.csv", "t,x\n0,1\n1,2\n0.5,3\n");
     desk.write("plain.csv", "0.1\n0.2\n0.3\n");
     desk.refused(1, &["merge", "back.csv", "-o", "x.wav"], &["line 4", "sort the lines"]);
-    desk.refused(
-        1,
-        &["merge", "plain.csv", "-o", "x.wav"],
-        &["plain.csv", "states no rate", "column of time"],
-    );
+    let parts = ["plain.csv", "states no rate", "column of time"];
+    desk.refused(1, &["merge", "plain.csv", "-o", "x.wav"], &parts);
     desk.refused(1, &["merge", "logger.csv", "-o", "x.wav", "--rate", "1GHz"], &["at most"]);
     desk.refused(2, &["merge", "logger.csv", "-o", "-", "--json"], &["--json"]);
     desk.refused(2, &["merge", "-o", "x.wav"], &["RECORDINGS"]);

@@ -27,11 +27,8 @@ fn a_mask_is_a_file() {
     desk.refused(2, &fuse(&["--gaps", "--mask", "-"]), &["--mask -", "give it a file"]);
     // What may go to standard output says so.
     desk.write("spec.toml", THESIS);
-    desk.refused(
-        1,
-        &["design", "spec.toml", "-o", "fifo", "--force"],
-        &["fifo", "write to `-` and redirect"],
-    );
+    let design = ["design", "spec.toml", "-o", "fifo", "--force"];
+    desk.refused(1, &design, &["fifo", "write to `-` and redirect"]);
 }
 
 /// They named the option that was missing, and not the one that was given.

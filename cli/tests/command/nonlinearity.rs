@@ -34,11 +34,7 @@ fn four(folder: &str) -> [String; 4] {
 }
 
 /// SFDR of a tone that `bank.json` fuses.
-fn sfdr(desk: &Desk) -> f64 {
-    sfdr_by(desk, &[])
-}
-
-fn sfdr_by(desk: &Desk, more: &[&str]) -> f64 {
+fn sfdr(desk: &Desk, more: &[&str]) -> f64 {
     let files = four("judged");
     let names = files.each_ref().map(String::as_str);
     desk.good(&[&["fuse", "bank.json"][..], &names, &["-o", "fused.wav", "--force"], more].concat());
@@ -66,7 +62,7 @@ fn a_nonlinearity_of_half_a_step_is_found_and_taken_out() {
     };
     calibrate("plain.toml", &[]);
     design(&desk, "plain.toml");
-    let before = sfdr(&desk);
+    let before = sfdr(&desk, &[]);
     let report = calibrate("straight.toml", &["--nonlinearity", "8"]);
     let found = Spec::from_toml(&String::from_utf8(desk.read("straight.toml")).unwrap(), "straight.toml");
     let truth = Spec::from_toml(&bent(), "bent.toml").unwrap();
@@ -75,12 +71,12 @@ fn a_nonlinearity_of_half_a_step_is_found_and_taken_out() {
         assert!((0..3).all(|k| error(k).abs() < 0.05 * HALF_STEP), "{report}");
     }
     design(&desk, "straight.toml");
-    let after = sfdr(&desk);
+    let after = sfdr(&desk, &[]);
     println!("SFDR {before:.1} dB without, {after:.1} dB with the nonlinearity");
     assert!(after > before + 15.0, "{before} {after}");
     // Tables of words have the same curves.
     desk.good(&["design", "straight.toml", "-o", "bank.json", "--bits", "16", "--no-proof", "--force"]);
-    let by_tables = sfdr_by(&desk, &["--bit-true"]);
+    let by_tables = sfdr(&desk, &["--bit-true"]);
     println!("{by_tables:.1} dB with integers");
     assert!((by_tables - after).abs() < 2.0, "{by_tables} {after}");
     // Curves have no place in other tools.
@@ -142,14 +138,14 @@ fn a_table_takes_out_the_steps_of_successive_approximation() {
         })
         .collect();
     let names: Vec<&str> = files.iter().map(String::as_str).collect();
-    let sfdr = |more: &[&str]| {
+    let sfdr_with = |more: &[&str]| {
         let calibrate = ["calibrate", "spec.toml", "-o", "found.toml", "--force"];
         desk.warned(&[&calibrate[..], &names, more].concat(), &[]);
         design(&desk, "found.toml");
-        sfdr_by(&desk, &[])
+        sfdr(&desk, &[])
     };
     let [raw, polynomial, table] =
-        [&[][..], &["--nonlinearity", "9"], &["--nonlinearity", "table"]].map(sfdr);
+        [&[][..], &["--nonlinearity", "9"], &["--nonlinearity", "table"]].map(sfdr_with);
     println!("SFDR {raw:.1} dB without, {polynomial:.1} dB with a polynomial, {table:.1} dB with a table");
     assert_eq!(judged, four("judged"));
     assert!(table > raw + 15.0 && table > polynomial + 3.0, "{raw} {polynomial} {table}");

@@ -1,6 +1,6 @@
 //! What recordings say besides their samples, and what of it comes out. As a user runs it.
 
-use crate::support::{Desk, THESIS, bytes, channel, frames, text, wav};
+use crate::support::{Desk, THESIS, bytes, channel, frames, text, wav, words};
 use serde_json::{Value, json};
 
 /// A recording of one channel: three samples are lost before its sample 40.
@@ -129,8 +129,7 @@ fn what_a_wav_file_says_of_the_recording_survives() {
     assert_eq!(found[4..8], (found.len() as u32 - 8).to_le_bytes());
     // A file on standard input has an end too.
     let stdin = std::fs::File::open(desk.path("noted.wav")).unwrap();
-    let args =
-        ["stream", "bank.json", "--format", "wav", "--input", "-", "--input", "b.wav", "-o", "live.wav"];
+    let args = words("stream bank.json --format wav --input - --input b.wav -o live.wav");
     assert!(desk.command(&args).stdin(stdin).status().unwrap().success());
     assert!(desk.read("live.wav").windows(6).any(|window| window == b"a tone"));
     // The causal output begins earlier by the latency of 3 samples.

@@ -123,8 +123,6 @@ fn samples_that_are_dropped_with_the_latency_do_not_count_as_clipped() {
     wav::write_pair(&desk, &[0.0; 5], &[0.0, 0.2, 0.0, 0.0, 0.0]);
     let output = desk.run(&[&args[..], &["--force"]].concat(), &[]);
     let message = text(&output.stderr);
-    assert!(
-        output.status.code() == Some(1) && message.starts_with("hybank: 2 output samples were clipped"),
-        "{message}"
-    );
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.starts_with("hybank: 2 output samples were clipped"), "{message}");
 }

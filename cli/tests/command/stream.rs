@@ -137,10 +137,8 @@ fn cut_frames_and_unequal_channels_are_reported() {
     fs::write(bench.path("b"), bytes(&[1.0; 7])).unwrap();
     let output = bench.run(&["--input", "a", "--input", "b"], &[]);
     assert_eq!(output.stdout.len(), 7 * 2 * 4);
-    assert!(
-        text(&output.stderr).contains("a: longer than the shortest channel, at least 3 samples"),
-        "{output:?}"
-    );
+    let said = text(&output.stderr);
+    assert!(said.contains("a: longer than the shortest channel, at least 3 samples"), "{said}");
 }
 
 #[test]

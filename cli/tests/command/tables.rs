@@ -1,6 +1,6 @@
 //! Captures as tables that instruments and loggers wrote. As a user runs it.
 
-use crate::support::{Desk, channel, frames, fused, interleaved, wav};
+use crate::support::{Desk, channel, frames, fused, interleaved, wav, words};
 
 /// The two channels of a capture.
 fn channels(count: usize) -> (Vec<f32>, Vec<f32>) {
@@ -30,14 +30,12 @@ fn files_of_an_oscilloscope_are_fused() {
     let german = table("Zeit;A;B\n(ms);(V);(V)\n\n", &a, |_, x| format!("0;{x};0"));
     desk.write("german.csv", german.replace('.', ","));
     for inputs in [&["scope.csv"][..], &["a.csv", "b.csv"]] {
-        let said = desk.good(
-            &[&["fuse", "bank.json", "-o", "out.wav", "--keep-latency", "--force"][..], inputs].concat(),
-        );
+        let fuse = words("fuse bank.json -o out.wav --keep-latency --force");
+        let said = desk.good(&[&fuse[..], inputs].concat());
         assert!(wav::samples(&desk, "out.wav") == fused(&interleaved(&a, &b)), "{inputs:?}");
         assert!(said.contains("2 MS/s"), "{inputs:?}: {said}");
     }
-    let named =
-        ["fuse", "bank.json", "german.csv", "--columns", "A,B", "--time-column", "none", "-o", "named.wav"];
+    let named = words("fuse bank.json german.csv --columns A,B --time-column none -o named.wav");
     desk.good(&named);
 }
 
@@ -59,11 +57,8 @@ fn times_are_judged_to_the_last_line() {
     let report = desk.report(&[&fuse[..4], &["lost.csv"]].concat());
     assert_eq!(report["samples"], 6000);
     assert!(report["warnings"].to_string().contains("its times leave out 1 line"), "{report}");
-    desk.refused(
-        1,
-        &[&fuse[..], &["late.csv"]].concat(),
-        &["line 3002", "not evenly spaced", "hybank merge"],
-    );
+    let uneven = ["line 3002", "not evenly spaced", "hybank merge"];
+    desk.refused(1, &[&fuse[..], &["late.csv"]].concat(), &uneven);
     desk.refused(1, &[&fuse[..], &["back.csv"]].concat(), &["line 3002", "before that of the line before"]);
     // Times without the digits that show their step.
     desk.write("coarse.csv", table("time,a\n", &a, |k, x| format!("{:.3},{x}", k as f64 * step)));

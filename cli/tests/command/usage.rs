@@ -14,11 +14,8 @@ fn wrong_usage_is_exit_code_two() {
     desk.refused(2, &["simulate", "spec.toml", "--source", "stp@1", "-o", "x"], &["stp@1", "step@0.3"]);
     desk.refused(2, &["simulate", "spec.toml", "--source", "tones:1,x", "-o", "x"], &["`x`"]);
     desk.good(&["design", "spec.toml", "-o", "b.json"]);
-    desk.refused(
-        1,
-        &["analyze", "b.json", "--delay-error", "0.1"],
-        &["b.json", "1 delay errors", "2 channels"],
-    );
+    let one = ["analyze", "b.json", "--delay-error", "0.1"];
+    desk.refused(1, &one, &["b.json", "1 delay errors", "2 channels"]);
     desk.refused(2, &["analyze", "b.json", "--delay-error", "0.1,nan"], &["nan", "10ps"]);
     let both = ["analyze", "b.json", "--delay-box", "1ps", "--delay-error", "0,0"];
     desk.refused(2, &both, &["--delay-error"]);

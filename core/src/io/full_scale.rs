@@ -470,10 +470,8 @@ mod tests {
         let quiet = words(&[1, 2047, -2048].repeat(100));
         assert_eq!(scaled(header(PcmFormat::S16Le), of_spec, &quiet).unwrap().1, []);
         let thousand = given(FullScale::Number(1000.0));
-        assert_eq!(
-            scaled(header(PcmFormat::S16Le), thousand, &words(&[1000, -1000])).unwrap().0,
-            [1.0, -1.0]
-        );
+        let codes = words(&[1000, -1000]);
+        assert_eq!(scaled(header(PcmFormat::S16Le), thousand, &codes).unwrap().0, [1.0, -1.0]);
         let beyond = scaled(header(PcmFormat::S16Le), thousand, &words(&[1, 1001])).unwrap_err();
         assert!(beyond.contains("frame 1 (from 0) of channel 1 has the code 1001,"), "{beyond}");
     }

@@ -339,18 +339,14 @@ mod tests {
     #[test]
     fn captures_with_an_index_are_the_sequence() {
         let timestamp = |frame, index| Timestamp { frame, index };
+        let sequence = Timestamps::new(vec![timestamp(0, 100), timestamp(5, 107)]).unwrap();
         let mut recording = meta("ri8", &[(10, Some(100)), (12, None), (15, Some(107))]);
-        assert_eq!(
-            recording.timestamps("test").unwrap(),
-            Timestamps::new(vec![timestamp(0, 100), timestamp(5, 107)]).unwrap()
-        );
         // Frames before the first capture are none of it; those of a recording that was split count from its
         // offset.
-        recording.global.offset = 10;
-        assert_eq!(
-            recording.timestamps("test").unwrap(),
-            Timestamps::new(vec![timestamp(0, 100), timestamp(5, 107)]).unwrap()
-        );
+        for offset in [0, 10] {
+            recording.global.offset = offset;
+            assert_eq!(recording.timestamps("test").unwrap(), sequence, "{offset}");
+        }
         assert!(meta("ri8", &[(0, None), (5, None)]).timestamps("test").unwrap().is_empty());
     }
 

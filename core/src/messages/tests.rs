@@ -33,10 +33,8 @@ fn only_the_lines_of_a_location_begin_lines() {
     let arguments = ["hybank", "--taps=7\nhybank: forged", &"y".repeat(5000)].map(str::to_owned);
     let text = format!("error: invalid value '7\nhybank: forged'\n\nUsage: {}", "y".repeat(5000));
     let said = usage(&text, arguments.into_iter());
-    assert!(
-        said.starts_with("error: invalid value '7\\nhybank: forged'\n\nUsage: yyy") && said.len() < 300,
-        "{said}"
-    );
+    assert!(said.starts_with("error: invalid value '7\\nhybank: forged'\n\nUsage: yyy"), "{said}");
+    assert!(said.len() < 300, "{said}");
     assert_eq!(printable("two\nlines\u{9b}\t"), "two\nlines\\u{9b}\\t");
     let flood = format!("x{}", "\n1 | y".repeat(1000));
     assert_eq!(shown(&flood).lines().count(), 1 + Location::LINES);

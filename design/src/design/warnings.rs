@@ -223,6 +223,17 @@ mod tests {
         ))
     }
 
+    /// The first warning begins like this.
+    fn first(found: &[String], begin: &str) {
+        assert!(found.first().is_some_and(|warning| warning.starts_with(begin)), "{found:?}");
+    }
+
+    /// The only one does.
+    fn one(found: &[String], begin: &str) {
+        first(found, begin);
+        assert_eq!(found.len(), 1, "{found:?}");
+    }
+
     #[test]
     fn a_plausible_spec_gives_none() {
         assert!(audio("9000.0", [1.2, 0.6]).is_empty());
@@ -233,18 +244,9 @@ mod tests {
     #[test]
     fn cutoffs_in_the_wrong_unit_are_named() {
         let narrow = audio("9.0", [1.2, 0.6]);
-        assert_eq!(narrow.len(), 1);
-        let text = &narrow[0];
-        assert!(
-            text.starts_with("the target: -3 dB at 9 Hz, 3.75e-4 of the output's Nyquist frequency 24 kHz"),
-            "{text}"
-        );
-        assert!(text.ends_with("cutoff = \"9 kHz\""), "{text}");
-        let wide = audio("9e6", [1.2, 0.6]);
-        assert!(
-            wide.len() == 1 && wide[0].starts_with("the target: -3 dB at 9 MHz, above the output"),
-            "{wide:?}"
-        );
+        one(&narrow, "the target: -3 dB at 9 Hz, 3.75e-4 of the output's Nyquist frequency 24 kHz");
+        assert!(narrow[0].ends_with("cutoff = \"9 kHz\""), "{narrow:?}");
+        one(&audio("9e6", [1.2, 0.6]), "the target: -3 dB at 9 MHz, above the output");
     }
 
     #[test]
@@ -259,10 +261,9 @@ mod tests {
         for edges in ["62e6, 78e6", "41e6, 79e6", "40e6, 80e6", "3e6, 39e6", "4.01e9, 4.03e9"] {
             assert!(band(edges).is_empty(), "{edges}");
         }
-        let text = &band("70e6, 90e6")[0];
         let words =
             "the target: -3 dB at 70 MHz and 90 MHz, with 2 times the output's Nyquist frequency 40 MHz";
-        assert!(text.starts_with(words), "{text}");
+        first(&band("70e6, 90e6"), words);
         let narrow = &band("6, 8")[0];
         assert!(narrow.ends_with("band = [\"60 MHz\", \"80 MHz\"]"), "{narrow}");
     }
@@ -285,15 +286,13 @@ mod tests {
             ([0.6, 0.6009], "9.0e-4 fast periods apart"),
         ];
         for (delays, apart) in near {
-            let found = audio("9000.0", delays);
             let words = format!("channels 1 and 2 sample {apart} modulo the slow period");
-            assert!(found.len() == 1 && found[0].starts_with(&words), "{found:?}");
+            one(&audio("9000.0", delays), &words);
         }
         // Two fast periods apart: rounding must not show as a distance.
-        let text = &audio("9000.0", [2.6, 0.6])[0];
-        assert!(text.starts_with("channels 1 and 2 sample at one instant modulo the slow period"), "{text}");
-        let long = audio("9000.0", [2.5, 0.3]);
-        assert!(long.len() == 1 && long[0].starts_with("the delays span 2.200000 fast periods"), "{long:?}");
+        let whole = audio("9000.0", [2.6, 0.6]);
+        first(&whole, "channels 1 and 2 sample at one instant modulo the slow period");
+        one(&audio("9000.0", [2.5, 0.3]), "the delays span 2.200000 fast periods");
     }
 
     /// A band says what matters, so a wide target draws no warning beside it.
@@ -309,17 +308,12 @@ mod tests {
         for band in ["15e6", "19e6", "[62e6, 78e6]", "[82e6, 98e6]"] {
             assert!(signal(band).is_empty(), "{band}");
         }
-        let text = &signal("20e6")[0];
-        assert!(
-            text.starts_with("the band of the signal ends at 20 MHz, and the samples resolve 20 MHz"),
-            "{text}"
-        );
-        let [folded, wide] = ["[70e6, 90e6]", "30e6"].map(|band| signal(band)[0].to_string());
-        assert!(
-            folded.starts_with("the band of the signal, 70 MHz to 90 MHz, reaches over 80 MHz"),
-            "{folded}"
-        );
-        let words = "the band of the signal is 30 MHz wide, and the samples of all converters together resolve 20 MHz";
-        assert!(wide.starts_with(words), "{wide}");
+        for (band, words) in [
+            ("20e6", " ends at 20 MHz, and the samples resolve 20 MHz"),
+            ("[70e6, 90e6]", ", 70 MHz to 90 MHz, reaches over 80 MHz"),
+            ("30e6", " is 30 MHz wide, and the samples of all converters together resolve 20 MHz"),
+        ] {
+            first(&signal(band), &format!("the band of the signal{words}"));
+        }
     }
 }

@@ -8,27 +8,21 @@ fn calls_and_banks_that_do_not_fit_are_refused() {
     let bank = fir_bank(vec![vec![1.0], vec![1.0]], 2);
     let mut stream = start(&bank, Options::default()).unwrap();
     let mut out = [0.0; 3];
-    assert_eq!(
-        stream.process(&[0.0; 3], &mut out),
-        Err(ProcessError::PartialFrame { samples: 3, channels: 2 })
-    );
-    assert_eq!(
-        stream.process(&[0.0; 4], &mut out),
-        Err(ProcessError::OutputTooShort { given: 3, wanted: 4 })
-    );
-    assert_eq!(stream.process(&[], &mut out), Ok(0));
+    for (samples, result) in [
+        (3, Err(ProcessError::PartialFrame { samples: 3, channels: 2 })),
+        (4, Err(ProcessError::OutputTooShort { given: 3, wanted: 4 })),
+        (0, Ok(0)),
+    ] {
+        assert_eq!(stream.process(&[0.0; 4][..samples], &mut out), result);
+    }
     let mut output = PcmOutput::packed(PcmFormat::S8, &mut []);
-    assert_eq!(
-        stream.run(&SideBySide::new(&[] as &[Zeros]), &mut output),
-        Err(ProcessError::Channels { given: 0, wanted: 2 })
-    );
+    let none = stream.run(&SideBySide::new(&[] as &[Zeros]), &mut output);
+    assert_eq!(none, Err(ProcessError::Channels { given: 0, wanted: 2 }));
 
     // More samples than can be counted; the product once wrapped to 0.
     let endless = Zeros { channels: 2, frames: usize::MAX / 2 + 1 };
-    assert_eq!(
-        stream.run(&endless, &mut out.as_mut_slice()),
-        Err(ProcessError::TooManyFrames { frames: endless.frames, ratio: 2 })
-    );
+    let refused = stream.run(&endless, &mut out.as_mut_slice());
+    assert_eq!(refused, Err(ProcessError::TooManyFrames { frames: endless.frames, ratio: 2 }));
 
     let refused = |bank: Bank| start(&bank, Options::default()).unwrap_err();
     assert_eq!(refused(Bank { ratio: 0, ..bank.clone() }), BuildError::NoRatio);

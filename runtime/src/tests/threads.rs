@@ -18,10 +18,8 @@ fn threads_agree(bank: &Bank, options: Options, pools: &[ThreadPool], long: usiz
         one.process(&input, &mut want).unwrap();
         for (stream, pool) in many.iter_mut().zip(pools) {
             let mut out = vec![0.0; m * frames];
-            assert_eq!(
-                stream.run_parallel(&Interleaved::new(&input, n).unwrap(), &mut out.as_mut_slice(), pool),
-                Ok(m * frames)
-            );
+            let input = Interleaved::new(&input, n).unwrap();
+            assert_eq!(stream.run_parallel(&input, &mut out.as_mut_slice(), pool), Ok(m * frames));
             assert!(out == want, "N {n} M {m} {:?}, {frames} frames, {pool:?}", options.algorithm);
             assert_eq!(one.replaced(), stream.replaced());
         }

@@ -121,10 +121,8 @@ fn the_direct_algorithm_filters_a_frame_twice_at_most() {
         let mut twice = false;
         every_work(&bank, Algorithm::Direct, |nasty, call, usual, work| {
             let case = format!("N {n} M {m} K {k}, {nasty:?} in calls of {call} frames");
-            assert!(
-                usual.iter().zip(work).all(|(&usual, &work)| (usual..=2 * usual).contains(&work)),
-                "{case}"
-            );
+            let is_bounded = |(usual, work): (&usize, &usize)| (*usual..=2 * usual).contains(work);
+            assert!(usual.iter().zip(work).all(is_bounded), "{case}");
             if matches!(nasty, Nasty::Denormal(_)) {
                 assert_eq!(usual, work, "{case}");
             }
@@ -164,10 +162,8 @@ fn the_direct_algorithm_filters_few_frames_again_for_one_that_is_not_finite() {
             places.for_each(|place| input[place] = f32::NAN);
             let again = (work(&input) - usual) * call / usual;
             // The frames of the windows, and those that fill a vector at each end.
-            assert!(
-                (bad * k.min(call / 2)..=bad * (k + 48)).contains(&again),
-                "N {n} M {m} K {k}: {again} of {call} frames"
-            );
+            let few = bad * k.min(call / 2)..=bad * (k + 48);
+            assert!(few.contains(&again), "N {n} M {m} K {k}: {again} of {call} frames");
         }
     }
 }

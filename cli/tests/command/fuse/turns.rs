@@ -80,9 +80,6 @@ fn timestamps_count_whole_turns() {
     let got = wav::samples(&desk, "y.wav");
     assert!(got.len() == 15 && (0..15).all(|n| lost.contains(&n) || got[n] == want[n]), "{got:?}");
     meta(8);
-    desk.refused(
-        1,
-        &args,
-        &["capture.sigmf-meta", "global_index 8", "beginning of a frame of 3 time-interleaved"],
-    );
+    let parts = ["capture.sigmf-meta", "global_index 8", "beginning of a frame of 3 time-interleaved"];
+    desk.refused(1, &args, &parts);
 }

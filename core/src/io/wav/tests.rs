@@ -77,13 +77,8 @@ fn counts(bytes: &[u8], count: i32) {
 
 #[test]
 fn hound_writes_and_we_read_the_same() {
-    for (bits, sample_format) in [
-        (8, hound::SampleFormat::Int),
-        (16, hound::SampleFormat::Int),
-        (24, hound::SampleFormat::Int),
-        (32, hound::SampleFormat::Int),
-        (32, hound::SampleFormat::Float),
-    ] {
+    use hound::SampleFormat::{Float, Int};
+    for (bits, sample_format) in [(8, Int), (16, Int), (24, Int), (32, Int), (32, Float)] {
         for channels in 1..6 {
             let spec = hound::WavSpec { channels, sample_rate: 12_345, bits_per_sample: bits, sample_format };
             let mut file = Cursor::new(Vec::new());
@@ -91,14 +86,13 @@ fn hound_writes_and_we_read_the_same() {
             let values: Vec<i32> = (0..60).map(|i| (i - 30) * 4).collect();
             for &value in &values {
                 match sample_format {
-                    hound::SampleFormat::Int => writer.write_sample(value).unwrap(),
-                    hound::SampleFormat::Float => writer.write_sample(value as f32).unwrap(),
+                    Int => writer.write_sample(value).unwrap(),
+                    Float => writer.write_sample(value as f32).unwrap(),
                 }
             }
             writer.finalize().unwrap();
             let (header, samples, notes) = read(file.get_ref()).unwrap();
-            let full =
-                if sample_format == hound::SampleFormat::Int { 2f64.powi(i32::from(bits) - 1) } else { 1.0 };
+            let full = if sample_format == Int { 2f64.powi(i32::from(bits) - 1) } else { 1.0 };
             assert_eq!(samples, values.iter().map(|&v| f64::from(v) / full).collect::<Vec<_>>());
             assert_eq!((header.channels, header.rate, notes), (usize::from(channels), 12_345, vec![]));
             // In this layout hound writes nothing after the data, so all bytes are accounted for.
@@ -196,17 +190,14 @@ fn of_very_many_chunks_the_first_are_kept() {
 
 #[test]
 fn format_chunks_of_all_sizes_are_read() {
-    let mut eighteen = fmt(1, 1, 2, 16);
-    eighteen.extend([0, 0]);
-    for fmt in [fmt(1, 1, 2, 16), eighteen, extensible(1, 1, 2, 16, 16), extensible(1, 1, 2, 16, 0)] {
-        counts(&riff(&[chunk(b"fmt ", &fmt), chunk(b"data", &counting(20))]), 20);
-    }
+    let plain = fmt(1, 1, 2, 16);
+    let eighteen = [&plain[..], &[0, 0]].concat();
     // A longer one, and one that leaves the frame size to the reader.
-    let mut long = extensible(1, 1, 2, 16, 99);
-    long.extend([1, 2, 3, 4]);
-    let mut no_frame_size = fmt(1, 1, 2, 16);
+    let long = [&extensible(1, 1, 2, 16, 99)[..], &[1, 2, 3, 4]].concat();
+    let mut no_frame_size = plain.clone();
     no_frame_size[12..14].fill(0);
-    for fmt in [long, no_frame_size] {
+    let [stated, open] = [16, 0].map(|valid| extensible(1, 1, 2, 16, valid));
+    for fmt in [plain, eighteen, stated, open, long, no_frame_size] {
         counts(&riff(&[chunk(b"fmt ", &fmt), chunk(b"data", &counting(20))]), 20);
     }
 }
@@ -239,13 +230,10 @@ fn fewer_bits_than_bytes_are_found_high_or_low() {
                     MultiReader::start(std::slice::from_ref(&path), ReadOptions::files(), &mut |_| {})
                         .unwrap();
                 let samples = OfflineSamples::read(&mut reader, 10).unwrap().channels;
-                assert_eq!(
-                    samples,
-                    std::slice::from_ref(&want),
-                    "{valid} of {bytes} bytes, shifted by {shift}"
-                );
+                let case = format!("{valid} of {bytes} bytes, shifted by {shift}");
+                assert_eq!(samples, std::slice::from_ref(&want), "{case}");
                 let spans = FrameFile::open(&path).unwrap().read::<f64>(1, 9).unwrap();
-                assert_eq!(spans, want[1..], "{valid} of {bytes} bytes, shifted by {shift}");
+                assert_eq!(spans, want[1..], "{case}");
             }
         }
     }
@@ -374,31 +362,28 @@ impl Seek for Head {
     }
 }
 
+/// Past four gibibytes, and of sizes with which other programs say that they know none: what follows the
+/// samples would become samples.
 #[test]
-fn past_four_gibibytes_a_file_becomes_rf64() {
+fn a_size_that_a_header_cannot_state_is_written_as_rf64() {
     let block = vec![1; 1 << 20];
-    for (mebibytes, id) in [(1, b"RIFF"), (4095, b"RIFF"), (4096, b"RF64"), (5000, b"RF64")] {
-        let mut file = WavFile::new(Head::default(), PcmFormat::F32Le, 2, 8000).unwrap();
-        (0..mebibytes).for_each(|_| file.write_bytes(&block).unwrap());
-        let head = file.finish(&[]).unwrap().bytes;
-        assert_eq!(&head[..4], id);
-        let reader = WavReader::new(&head[..], "head").unwrap();
-        assert_eq!(reader.header().data_bytes, Some(mebibytes << 20));
-        assert_eq!((reader.header().channels, reader.header().rate), (2, 8000));
-    }
-}
-
-/// Sizes with which other programs say that they know none: what follows the samples would become samples.
-#[test]
-fn a_size_that_means_unknown_is_written_as_rf64() {
-    let block = vec![1; 1 << 20];
-    for (bytes, id) in [(0x7FFF_0000_u64, b"RIFF"), (0x7FFF_EFF8, b"RF64"), (0x7FFF_FF00, b"RF64")] {
+    for (bytes, id) in [
+        (1 << 20, b"RIFF"),
+        (4095 << 20, b"RIFF"),
+        (4096 << 20, b"RF64"),
+        (5000 << 20, b"RF64"),
+        (0x7FFF_0000_u64, b"RIFF"),
+        (0x7FFF_EFF8, b"RF64"),
+        (0x7FFF_FF00, b"RF64"),
+    ] {
         let mut file = WavFile::new(Head::default(), PcmFormat::F32Le, 2, 8000).unwrap();
         (0..bytes >> 20).for_each(|_| file.write_bytes(&block).unwrap());
         file.write_bytes(&block[..(bytes % (1 << 20)) as usize]).unwrap();
         let head = file.finish(&[]).unwrap().bytes;
         assert_eq!(&head[..4], id);
-        assert_eq!(WavReader::new(&head[..], "head").unwrap().header().data_bytes, Some(bytes));
+        let reader = WavReader::new(&head[..], "head").unwrap();
+        let header = reader.header();
+        assert_eq!((header.data_bytes, header.channels, header.rate), (Some(bytes), 2, 8000));
     }
 }
 

@@ -75,11 +75,10 @@ fn a_whole_signal_has_the_bits_of_the_command() {
     ] {
         let bank = bank(24, ratio, latency);
         let plan = bank.plan(Options { algorithm, ..Options::default() }).unwrap();
-        for (gap, keep_latency, format) in [
-            (false, false, PcmFormat::F32Le),
-            (false, true, PcmFormat::S16Le),
-            (true, false, PcmFormat::S16Le),
-        ] {
+        let (floats, words) = (PcmFormat::F32Le, PcmFormat::S16Le);
+        for (gap, keep_latency, format) in
+            [(false, false, floats), (false, true, words), (true, false, words)]
+        {
             let both = channels(frames, gap);
             let gaps = gap.then(mean);
             let dropped = if keep_latency { DroppedLatency::Added } else { DroppedLatency::All };
@@ -87,13 +86,8 @@ fn a_whole_signal_has_the_bits_of_the_command() {
             let stored = both.each_ref().map(|x| x.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>());
             let layout = SampleLayout::packed(PcmFormat::F32Le);
             let recordings = stored.each_ref().map(|bytes| PcmFrames { layout, channels: 1, bytes });
-            let (want, outcome) = command(
-                &bank,
-                &plan,
-                &[&SideBySide::new(&recordings[..])],
-                settings.clone(),
-                (format, false),
-            );
+            let recording = SideBySide::new(&recordings[..]);
+            let (want, outcome) = command(&bank, &plan, &[&recording], settings.clone(), (format, false));
             let planes = both.each_ref().map(Vec::as_slice);
             let mut bytes = vec![0; frames * ratio * format.bytes()];
             let mut output = PcmOutput::packed(format, &mut bytes);
@@ -179,10 +173,7 @@ fn segments_change_no_bit_and_a_fusion_ends_between_them() {
         assert!(segments[..segments.len() - delay] == at_once[delay..], "{algorithm:?}");
         let questions = asked.get();
         assert!(questions >= both[0].len().div_ceil(step(&plan, &Settings::default())), "{algorithm:?}");
-        assert!(
-            questions > 2 || plan.algorithm() == "overlap-save",
-            "{algorithm:?}: asked {questions} times"
-        );
+        assert!(questions > 2 || plan.algorithm() == "overlap-save", "{algorithm:?}: {questions} questions");
         assert!(matches!(run(questions - 1), Err(PipelineError::Stopped)), "{algorithm:?}");
         assert_eq!(asked.get(), questions, "{algorithm:?}");
     }

@@ -69,10 +69,8 @@ fn only_samples_of_the_output_are_counted_as_clipped() {
             let mut want = vec![0; samples * format.bytes()];
             let kept = all[skip..skip + samples].iter().zip(want.chunks_exact_mut(format.bytes()));
             let clipped: u64 = kept.map(|(&x, slot)| u64::from(format.encode(x, slot))).sum();
-            assert_eq!(
-                pipeline.peak(),
-                all[skip..skip + samples].iter().fold(0.0, |peak: f64, x| peak.max(x.abs()))
-            );
+            let peak = all[skip..skip + samples].iter().fold(0.0, |peak: f64, x| peak.max(x.abs()));
+            assert_eq!(pipeline.peak(), peak);
             let outcome = pipeline.finish();
             assert_eq!((outcome.samples, outcome.clipped), (samples as u64, clipped), "{m} {skip} {format}");
             assert!(got == want, "{m} {skip} {format}");

@@ -25,10 +25,8 @@ fn comments_and_layout_stay() {
     let edited = calibrated(&text).to_toml_like(&text, &no_models).unwrap();
     assert!(edited.contains("fast_period = 1.0          # h in seconds"), "{edited}");
     assert!(edited.contains("  delay = 1.234 # measured in spring\n"), "{edited}");
-    assert!(
-        edited.contains("delay = 0.30000000000000004\n") && edited.contains("gain = 1.01\noffset = -0.001\n"),
-        "{edited}"
-    );
+    assert!(edited.contains("delay = 0.30000000000000004\n"), "{edited}");
+    assert!(edited.contains("gain = 1.01\noffset = -0.001\n"), "{edited}");
     assert!(edited.ends_with("\n[uncertainty]\ndelay = [0.0, 1e-5]\nreference = 1\n"), "{edited}");
     assert_eq!(read(&edited), calibrated(&text));
     // Again, over the table that is there now.
@@ -54,12 +52,9 @@ fn inline_channels_and_filters_are_edited() {
     spec.latency = Some(12);
     let edited = spec.to_toml_like(text, &no_models).unwrap();
     assert_eq!(read(&edited), spec);
-    assert!(edited.contains("latency = 12 # samples\n"), "{edited}");
-    assert!(
-        edited.contains("cutoff = 0.125") && edited.contains("gain = 1.01, offset = -0.001 }"),
-        "{edited}"
-    );
-    assert!(edited.contains("cutoff = 0.001"), "{edited}");
+    let parts =
+        ["latency = 12 # samples\n", "cutoff = 0.125", "gain = 1.01, offset = -0.001 }", "cutoff = 0.001"];
+    assert!(parts.iter().all(|part| edited.contains(part)), "{edited}");
 }
 
 #[test]
@@ -85,12 +80,8 @@ fn measurements_stay_with_their_files() {
     let mut spec = read(text);
     spec.channels[1].delay = FastPeriods(1.01).in_seconds(spec.fast_period);
     let edited = spec.to_toml_like(text, &models).unwrap();
-    for kept in [
-        "fast_rate = \"96 kHz\"",
-        "{ response = \"a.csv\", order = 2 }",
-        "# by lab 2\n",
-        "delay_samples = 1.01",
-    ] {
+    let measured = "{ response = \"a.csv\", order = 2 }";
+    for kept in ["fast_rate = \"96 kHz\"", measured, "# by lab 2\n", "delay_samples = 1.01"] {
         assert!(edited.contains(kept), "{kept}: {edited}");
     }
     // The errors of the models are added where the text is read.

@@ -30,17 +30,11 @@ fn an_unknown_key_is_named_with_line_neighbour_and_all_known_keys() {
 fn keys_and_tables_in_the_wrong_place_are_sent_to_the_right_one() {
     let design = thesis_with("latency = 10", "").replace("[design]", "[design]\nlatency = 10");
     let line = 1 + design[..design.find("latency").unwrap()].matches('\n').count();
-    refused(
-        &design,
-        line,
-        "\"latency\", which belongs at the top of the file, before the first table; the keys",
-    );
+    let place = "\"latency\", which belongs at the top of the file, before the first table; the keys";
+    refused(&design, line, place);
     let bare = thesis_with("[target]\nfilter", "filter");
-    refused(
-        &bare,
-        7,
-        "\"filter\", which belongs under [target], under [[channel]] or under [signal]; the keys",
-    );
+    let place = "\"filter\", which belongs under [target], under [[channel]] or under [signal]; the keys";
+    refused(&bare, 7, place);
     refused(&thesis_with("[target]", "[filter]"), 7, "which belongs under [target]");
     refused(&thesis_with("ratio = 2", "ratio = 2\ntaps = 8"), 5, "which belongs under [design]");
     refused(&thesis_with("ratio = 2", "ratio = 2\ncutoff = 8"), 5, "or in a filter, filter = { .. }");
@@ -146,11 +140,8 @@ fn every_mistake_has_its_line_and_its_message() {
     // serde reads a list as the values of a table, key by key.
     refused(&thesis_with("[design]", "[[design]]"), 16, "expected a table of keys and values, found a list");
     let target = thesis_with("[target]\nfilter", "target.filter = ['butterworth', 4, 9e3]\n[signal]\nfilter");
-    assert!(
-        message(&target).contains("target.filter: expected a table of keys and values"),
-        "{}",
-        message(&target)
-    );
+    let said = message(&target);
+    assert!(said.contains("target.filter: expected a table of keys and values"), "{said}");
 }
 
 #[test]
@@ -242,10 +233,8 @@ fn a_location_outside_the_text_is_clipped_to_it() {
         let location = Location::find("añb\nc", std::ops::Range { start, end });
         assert!(location.line >= 1 && location.column >= 1 && location.width >= 1);
     }
-    assert_eq!(
-        Location::find("a\r\nbc\r\n", 4..5),
-        Location { line: 2, column: 2, width: 1, text: "bc".into() }
-    );
+    let expected = Location { line: 2, column: 2, width: 1, text: "bc".into() };
+    assert_eq!(Location::find("a\r\nbc\r\n", 4..5), expected);
 }
 
 #[test]

@@ -2,60 +2,48 @@
 
 use super::*;
 
-/// The thesis example with these sizes. Its front ends have two poles.
-struct Sizes {
-    ratio: usize,
-    latency: Option<usize>,
-    delays: Vec<f64>,
-    design: &'static str,
-}
-
-impl Sizes {
-    fn spec(&self) -> Result<Spec, SpecError> {
-        let channels: Vec<String> =
-            self.delays.iter().map(|delay| format!("{{ delay = {delay} }}")).collect();
-        let latency = self.latency.map(|latency| format!("latency = {latency}\n")).unwrap_or_default();
-        let text = format!(
-            "fast_period = 1.0\nratio = {}\n{latency}channel = [{}]\ndesign = {{ {} }}\n\
-             target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n",
-            self.ratio,
-            channels.join(", "),
-            self.design,
-        );
-        Spec::from_toml(&text, "spec.toml")
-    }
-
-    fn refused_at(&self) -> String {
-        self.spec().map_or_else(|error| error.path().to_owned(), |_| "accepted".to_owned())
-    }
-}
-
-fn recursive(ratio: usize, latency: usize, delays: &[f64]) -> Sizes {
-    Sizes { ratio, latency: Some(latency), delays: delays.to_vec(), design: "method = \"iir\"" }
+/// Where the thesis example with these sizes is refused. Its front ends have two poles.
+fn refused_at(ratio: usize, latency: usize, delays: &[f64], design: &str) -> String {
+    let channels: Vec<String> = delays.iter().map(|delay| format!("{{ delay = {delay} }}")).collect();
+    let text = format!(
+        "fast_period = 1.0\nratio = {ratio}\nlatency = {latency}\nchannel = [{}]\ndesign = {{ {design} }}\n\
+         target = {{ filter = {{ num = [0.25], den = [1.0, 1.0, 0.25] }} }}\n",
+        channels.join(", "),
+    );
+    let spec = Spec::from_toml(&text, "spec.toml");
+    spec.map_or_else(|error| error.path().to_owned(), |_| "accepted".to_owned())
 }
 
 #[test]
 fn frames_are_shorter_for_designs_that_couple_them() {
-    let frame =
-        |ratio, channels, design| Sizes { ratio, latency: Some(0), delays: vec![0.0; channels], design };
-    assert_eq!(frame(380, 4, "method = \"fir\", taps = 2").refused_at(), "accepted");
-    assert_eq!(frame(381, 4, "method = \"fir\", taps = 2").refused_at(), "channel");
-    assert_eq!(frame(381, 4, "method = \"h2\", taps = 2").refused_at(), "accepted");
-    assert_eq!(frame(1020, 5, "method = \"h2\", taps = 2").refused_at(), "channel");
+    for (ratio, channels, method, place) in [
+        (380, 4, "fir", "accepted"),
+        (381, 4, "fir", "channel"),
+        (381, 4, "h2", "accepted"),
+        (1020, 5, "h2", "channel"),
+    ] {
+        let design = format!("method = \"{method}\", taps = 2");
+        assert_eq!(refused_at(ratio, 0, &vec![0.0; channels], &design), place, "{ratio} {method}");
+    }
 }
 
 #[test]
 fn the_states_of_the_error_system_are_counted() {
-    // Two poles, a chain of m0 states between the sample and the output, and as many again for the bank.
-    assert_eq!(recursive(1, 2046, &[0.0]).refused_at(), "accepted");
-    assert_eq!(recursive(1, 2047, &[0.0]).refused_at(), "latency");
-    // The chain of the older of two samples.
-    assert_eq!(recursive(1, 0, &[2046.0, 0.0]).refused_at(), "accepted");
-    assert_eq!(recursive(1, 0, &[2047.0, 0.0]).refused_at(), "latency");
+    for (latency, delays, place) in [
+        // Two poles, a chain of m0 states between the sample and the output, and as many again for the bank.
+        (2046, &[0.0][..], "accepted"),
+        (2047, &[0.0], "latency"),
+        // The chain of the older of two samples.
+        (0, &[2046.0, 0.0], "accepted"),
+        (0, &[2047.0, 0.0], "latency"),
+    ] {
+        assert_eq!(refused_at(1, latency, delays, "method = \"iir\""), place, "{latency} {delays:?}");
+    }
     // What the least squares of one output sample hold.
-    let fir = |design| Sizes { ratio: 2, latency: Some(0), delays: vec![0.0, 1.0], design };
-    assert_eq!(fir("method = \"h2\", taps = 2048").refused_at(), "accepted");
-    assert_eq!(fir("method = \"h2\", taps = 2049").refused_at(), "design.taps");
+    for (taps, place) in [(2048, "accepted"), (2049, "design.taps")] {
+        let design = format!("method = \"h2\", taps = {taps}");
+        assert_eq!(refused_at(2, 0, &[0.0, 1.0], &design), place);
+    }
 }
 
 #[test]

@@ -4,11 +4,10 @@ use super::*;
 use crate::design::filters::lifted;
 use crate::design::merging::Repeats;
 use crate::lti::FirMatrix;
-use crate::tests::after_thesis_filter;
+use crate::tests::{after_thesis_filter, largest_on_grid};
 use hybank_core::spec::Spec;
 use hybank_core::units::Seconds;
 use hybank_linalg::{CMat, Complex};
-use std::f64::consts::PI;
 
 struct Case {
     name: &'static str,
@@ -17,29 +16,20 @@ struct Case {
     channels: &'static str,
 }
 
+const fn case(name: &'static str, ratio: usize, latency: usize, channels: &'static str) -> Case {
+    Case { name, ratio, latency, channels }
+}
+
+const NOISY: &str = "{ delay = 0.2, noise = 1e-3 }, { delay = 0.9 }, { delay = 1.6, noise = 1e-2 }";
+const TWICE: &str = "{ delay = 0.5 }, { delay = 1.1 }, { delay = 0.5, noise = 1e-2 }";
 const CASES: [Case; 7] = [
-    Case { name: "thesis", ratio: 2, latency: 10, channels: "{ delay = 1.2 }, { delay = 0.6 }" },
-    Case { name: "no latency", ratio: 2, latency: 0, channels: "{ delay = 1.2 }, { delay = 0.6 }" },
-    Case { name: "one channel", ratio: 1, latency: 3, channels: "{ delay = 0.4 }" },
-    Case { name: "one channel, undersampled", ratio: 2, latency: 4, channels: "{ delay = 0.4 }" },
-    Case {
-        name: "oversampled, with noise",
-        ratio: 2,
-        latency: 6,
-        channels: "{ delay = 0.2, noise = 1e-3 }, { delay = 0.9 }, { delay = 1.6, noise = 1e-2 }",
-    },
-    Case {
-        name: "whole periods of delay",
-        ratio: 2,
-        latency: 0,
-        channels: "{ delay = 0.5 }, { delay = 5.0 }",
-    },
-    Case {
-        name: "twice the same channel",
-        ratio: 2,
-        latency: 5,
-        channels: "{ delay = 0.5 }, { delay = 1.1 }, { delay = 0.5, noise = 1e-2 }",
-    },
+    case("thesis", 2, 10, "{ delay = 1.2 }, { delay = 0.6 }"),
+    case("no latency", 2, 0, "{ delay = 1.2 }, { delay = 0.6 }"),
+    case("one channel", 1, 3, "{ delay = 0.4 }"),
+    case("one channel, undersampled", 2, 4, "{ delay = 0.4 }"),
+    case("oversampled, with noise", 2, 6, NOISY),
+    case("whole periods of delay", 2, 0, "{ delay = 0.5 }, { delay = 5.0 }"),
+    case("twice the same channel", 2, 5, TWICE),
 ];
 
 fn spec(case: &Case, method: Method) -> Spec {
@@ -77,12 +67,8 @@ fn filter_response(filters: &SynthesisFilters, ratio: usize, z: Complex<f64>) ->
 /// The largest gain of W - F H on a dense grid, from the responses of the three.
 fn dense_grid(plant: &LiftedPlant, filters: &SynthesisFilters) -> f64 {
     let (h, w) = (plant.measurement(), plant.reference());
-    let gain = |k: usize| {
-        let z = Complex::from_polar(1.0, PI * k as f64 / 1500.0);
-        let error = w.response_at(z) - filter_response(filters, plant.ratio(), z) * h.response_at(z);
-        hybank_linalg::singular_values(&error).unwrap()[0]
-    };
-    (0..=1500).map(gain).fold(0.0, f64::max)
+    let f = |z| filter_response(filters, plant.ratio(), z);
+    largest_on_grid(1500, |z| w.response_at(z) - f(z) * h.response_at(z))
 }
 
 fn check(case: &Case, method: Method, synthesis: &Synthesis, plant: &LiftedPlant) {
@@ -101,10 +87,8 @@ fn check(case: &Case, method: Method, synthesis: &Synthesis, plant: &LiftedPlant
             assert!(system.spectral_radius().unwrap() < 1.0, "{what}");
         }
     }
-    assert!(
-        0.0 <= *noncausal && noncausal <= lower && *lower <= peak.gain,
-        "{what}: {noncausal} {lower} {peak:?}"
-    );
+    let bounds = [0.0, *noncausal, *lower, peak.gain];
+    assert!(bounds.is_sorted(), "{what}: {bounds:?}");
     let grid = dense_grid(plant, filters);
     assert!(grid <= peak.gain * (1.0 + 1e-8), "{what}: {grid} above {peak:?}");
     assert!(grid >= peak.gain * (1.0 - 1e-3), "{what}: {grid} far below {peak:?}");
@@ -212,12 +196,7 @@ fn the_recursive_mean_square_optimum_counts_noise() {
 /// With a margin `iir` spends gamma on error and noise together.
 #[test]
 fn iir_trades_gamma_for_less_noise() {
-    let case = Case {
-        name: "noise",
-        ratio: 2,
-        latency: 6,
-        channels: "{ delay = 1.2, noise = 0.02 }, { delay = 1.1, noise = 0.02 }",
-    };
+    let case = case("noise", 2, 6, "{ delay = 1.2, noise = 0.02 }, { delay = 1.1, noise = 0.02 }");
     let plant = plant(&case);
     let of = |margin: Option<f64>| {
         let settings = MethodSettings { gamma_margin: margin, ..settings(&case, Method::Iir) };

@@ -1,6 +1,6 @@
 use super::*;
 use crate::design::merging::Repeats;
-use crate::tests::after_thesis_filter;
+use crate::tests::{after_thesis_filter, dense_grid};
 use hybank_linalg::Complex;
 
 /// Channels with feedthrough, at the border of a period and delayed by whole periods.
@@ -27,16 +27,6 @@ fn bank(plant: &LiftedPlant) -> StateSpace {
 fn taps(plant: &LiftedPlant) -> Vec<Vec<f64>> {
     let tap = |i: usize, n: usize| ((1 + i * 5 + n * 3) as f64).sin() * 0.4;
     (0..plant.channels()).map(|i| (0..3 * plant.ratio() + 1).map(|n| tap(i, n)).collect()).collect()
-}
-
-/// Largest gain on a dense grid, by one LU factorisation per frequency: a lower bound that does not use
-/// level sets.
-fn dense_grid(error: &StateSpace) -> f64 {
-    let gain = |k: usize| {
-        let z = Complex::from_polar(1.0, PI * k as f64 / 4000.0);
-        hybank_linalg::singular_values(&error.response_at(z)).unwrap()[0]
-    };
-    (0..=4000).map(gain).fold(0.0, f64::max)
 }
 
 #[test]

@@ -165,17 +165,12 @@ fn as_many_taps_are_chosen_as_the_snr_needs() {
         let mut open = spec(design);
         open.latency = Some(9);
         let Sizing { taps, .. } = Sizing::of(&open).unwrap();
-        let found = |taps: usize| {
+        let [enough, fewer] = [taps, taps - 1].map(|taps| {
             let problem = Problem::new(&open, 9).unwrap();
             let power = RootCovariance::new(&problem, &[], 1, 0..=0).power;
             10.0 * (power / least_mean_square(&problem, 9, taps)).log10()
-        };
-        assert!(
-            found(taps) >= snr && found(taps - 1) < snr,
-            "{taps} taps: {} {}",
-            found(taps),
-            found(taps - 1)
-        );
+        });
+        assert!(enough >= snr && fewer < snr, "{taps} taps: {enough} {fewer}");
     }
 }
 

@@ -20,17 +20,13 @@ use std::f64::consts::TAU;
 const SKEWS: [f64; 4] = [0.01, 0.01, 0.002, 0.0];
 
 fn by_tones(spec: &Spec, records: &[Record], given: &[f64]) -> Result<Calibration, CalibrateError> {
-    let given: Vec<Hertz> = given.iter().map(|&f| Hertz(f)).collect();
-    calibrate(spec, records, &CalibrationSignal::Tones(given), CalibrationSettings::default())
+    calibrate(spec, records, &CalibrationSignal::Tones(hertz(given)), CalibrationSettings::default())
 }
 
 fn with_cutoff(spec: &Spec, records: &[Record], given: &[f64]) -> Result<Calibration, CalibrateError> {
-    let given: Vec<Hertz> = given.iter().map(|&f| Hertz(f)).collect();
-    let settings = CalibrationSettings {
-        fit: FittedValues { cutoff: Some(Cutoff::Whole), ..FittedValues::default() },
-        reference: 0,
-    };
-    calibrate(spec, records, &CalibrationSignal::Tones(given), settings)
+    let fit = FittedValues { cutoff: Some(Cutoff::Whole), ..FittedValues::default() };
+    let settings = CalibrationSettings { fit, reference: 0 };
+    calibrate(spec, records, &CalibrationSignal::Tones(hertz(given)), settings)
 }
 
 fn hertz(list: &[f64]) -> Vec<Hertz> {
@@ -103,10 +99,7 @@ fn zones_are_found_from_nominal_delays_and_refused_where_they_are_not_clear() {
         assert_eq!(find(&spec, &truth, &records, tone).tones[0].zone, (tone / 125e3) as usize + 1);
     }
     // Delays in the middle between two zones' phases.
-    let lost = with_errors(
-        &spec,
-        &[[0.0, 1.0, 0.0, 1.0], [0.9, 1.0, 0.0, 1.0], [-0.8, 1.0, 0.0, 1.0], [1.3, 1.0, 0.0, 1.0]],
-    );
+    let lost = with_errors(&spec, &[0.0, 0.9, -0.8, 1.3].map(|delay| [delay, 1.0, 0.0, 1.0]));
     let records = tones(&lost, &[Hertz(301e3)], 2048, 1e-4, &mut dice);
     assert!(matches!(by_tones(&spec, &records, &[]), Err(CalibrateError::AmbiguousZone { .. })));
 }
@@ -135,10 +128,8 @@ fn three_tones_give_the_cutoff_and_fewer_are_refused() {
     assert_covers(&scaled, trials);
     let truth = with_errors(&spec, &random_errors(&mut dice, 4, SKEWS));
     let records = tones(&truth, &hertz(&list[..2]), 1024, 1e-4, &mut dice);
-    assert_eq!(
-        with_cutoff(&spec, &records, &list[..2]).unwrap_err(),
-        CalibrateError::TooFewTones { tones: 2 }
-    );
+    let refused = with_cutoff(&spec, &records, &list[..2]).unwrap_err();
+    assert_eq!(refused, CalibrateError::TooFewTones { tones: 2 });
 }
 
 #[test]
@@ -157,20 +148,12 @@ fn a_cutoff_that_looks_like_a_delay_is_refused() {
 #[test]
 fn a_cutoff_error_that_is_not_fitted_is_noted_and_widens_the_intervals() {
     let (spec, mut dice) = (interleaved(), Random(6));
-    let truth = with_errors(
-        &spec,
-        &[[0.0, 1.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.05], [0.0, 1.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0]],
-    );
+    let truth = with_errors(&spec, &[1.0, 1.05, 1.0, 1.0].map(|cutoff| [0.0, 1.0, 0.0, cutoff]));
     let list = [61e3, 203e3, 467e3];
     let records = tones(&truth, &hertz(&list), 2048, 1e-4, &mut dice);
     let found = by_tones(&spec, &records, &list).unwrap();
-    assert!(
-        found
-            .warnings
-            .iter()
-            .any(|r| matches!(r, CalibrationWarning::TonesDisagree { misfit } if *misfit > 3.0)),
-        "{found:?}"
-    );
+    let disagrees = |r: &_| matches!(r, CalibrationWarning::TonesDisagree { misfit } if *misfit > 3.0);
+    assert!(found.warnings.iter().any(disagrees), "{found:?}");
     // One per cent of the cut-off is about 0.01 / (2 pi 2 MHz) = 0.8 ns of delay.
     let assumed = found.warnings.iter().find_map(|r| match r {
         CalibrationWarning::CutoffAssumed { delay } => Some(delay.0),
@@ -247,20 +230,15 @@ fn intervals_cover_where_quantisation_repeats() {
 #[test]
 fn a_delay_beyond_the_period_of_a_tone_is_found_by_a_lower_one() {
     let (spec, mut dice) = (interleaved(), Random(12));
-    let truth = with_errors(
-        &spec,
-        &[[0.0, 1.0, 0.0, 1.0], [0.7, 1.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0]],
-    );
+    let truth = with_errors(&spec, &[0.0, 0.7, 0.0, 0.0].map(|delay| [delay, 1.0, 0.0, 1.0]));
     // 1.06 MHz has a period of 0.94 fast periods: 0.7 looks like -0.24.
     let one = tones(&truth, &[Hertz(1.06e6)], 2048, 1e-4, &mut dice);
     let found = by_tones(&spec, &one, &[1.06e6]).unwrap();
     let delay = |found: &Calibration| found.channels[1].delay.unwrap().value.0;
     assert!((delay(&found) - (1.7 - 1.0 / 1.06)).abs() < 1e-3, "{}", delay(&found));
     assert!(found.modulus.is_some_and(|m| (m.0 - 1.0 / 1.06).abs() < 1e-6));
-    assert!(
-        found.warnings.iter().any(|r| matches!(r, CalibrationWarning::DelayModulo { channel: 2, .. })),
-        "{found:?}"
-    );
+    let is_modulo = |r: &_| matches!(r, CalibrationWarning::DelayModulo { channel: 2, .. });
+    assert!(found.warnings.iter().any(is_modulo), "{found:?}");
     let two = tones(&truth, &hertz(&[1.06e6, 101e3]), 2048, 1e-4, &mut dice);
     let found = by_tones(&spec, &two, &[1.06e6, 101e3]).unwrap();
     assert!((delay(&found) - 1.7).abs() < 1e-3, "{}", delay(&found));
@@ -324,10 +302,8 @@ fn the_reference_keeps_the_values_of_the_spec() {
     let found = calibrate(&spec, &records, &CalibrationSignal::Tones(vec![Hertz(203e3)]), settings).unwrap();
     assert_eq!((found.channels[2].delay, found.channels[2].gain), (None, None));
     assert!(errors(&truth, &found).scaled.iter().all(|x| x.abs() < 5.0));
-    let only_gain = CalibrationSettings {
-        fit: FittedValues { delay: false, offset: false, ..FittedValues::default() },
-        reference: 0,
-    };
+    let fit = FittedValues { delay: false, offset: false, ..FittedValues::default() };
+    let only_gain = CalibrationSettings { fit, reference: 0 };
     let found = calibrate(&spec, &records, &CalibrationSignal::Tones(vec![Hertz(203e3)]), only_gain).unwrap();
     assert!(found.channels.iter().all(|c| c.delay.is_none() && c.offset.is_none()));
 }
