@@ -15,8 +15,6 @@ mod noise;
 mod path;
 mod pieces;
 mod steps;
-#[cfg(test)]
-mod tests;
 mod zeros;
 
 pub use clock::{ClockCourse, ClockStep};
@@ -343,3 +341,6 @@ fn alignment(
         clocks,
     }
 }
+
+#[cfg(test)]
+mod tests;
