@@ -74,7 +74,8 @@ pub(super) struct Args {
     /// Follow delays that change by a tone beside the signal, whose frequency is known to 100 ppm
     ///
     /// Its phases in blocks of 2048 frames tell the delays, from those of the bank on; the samples come one
-    /// and a half blocks later. Where it is not heard the delays stay, with a warning.
+    /// and a half blocks later. Where it is not found the delays stay, and a warning at the end says in how
+    /// many blocks. The predicted SNR does not count the errors of these delays.
     #[arg(long, value_name = "F", value_parser = pilot, conflicts_with_all =
           ["track", "algorithm", "gaps", "report", "threads", "lost", "mask", "longest"])]
     pilot: Option<Hertz>,

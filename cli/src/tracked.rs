@@ -156,25 +156,25 @@ impl MovingFusion {
                 Ok(Last { samples, quality, levels: levels.as_ref().map(LevelTrack::change), warning: None })
             }
             Self::Pilot(fusion) => {
-                let (blocks, silent) = (fusion.blocks(), fusion.silent_blocks());
+                let (blocks, missed) = (fusion.blocks(), fusion.missed_blocks());
                 let (samples, quality) = fusion.finish()?;
-                Ok(Last { samples, quality, levels: None, warning: of_silence(blocks, silent) })
+                Ok(Last { samples, quality, levels: None, warning: of_missed(blocks, missed) })
             }
         }
     }
 }
 
-/// What a user must know of a pilot that was not heard.
-fn of_silence(blocks: usize, silent: usize) -> Option<String> {
+/// The warning of a pilot that was not found everywhere.
+fn of_missed(blocks: usize, missed: usize) -> Option<String> {
     let blocks_of_all = counted(blocks, "block");
-    match (blocks, silent) {
+    match (blocks, missed) {
         (0, _) => Some(
-            "the samples ended before the pilot told anything, so the delays are those of the bank; it takes 2048 frames"
+            "the samples ended before the first block of 2048 frames of the pilot, so the delays are those of the bank"
                 .into(),
         ),
         (_, 0) => None,
         _ => Some(format!(
-            "the pilot told nothing in {silent} of {blocks_of_all}, where the delays stayed as they were; check its \
+            "the pilot was not found in {missed} of {blocks_of_all}, where the delays stayed as they were; check its \
              frequency and its level"
         )),
     }
@@ -401,7 +401,7 @@ fn read_lines(path: &Path, bank: &Bank) -> Result<Drift, Failure> {
         let is_given = kind == 0 || lines.first().is_some_and(|line| line[kind].is_some());
         is_given.then(|| (0..bank.channel_count()).map(|i| column(kind, i)).collect())
     };
-    // At the ends, and beside what is lost, delays are known far worse than elsewhere.
+    // At the ends, and beside lost samples, delays err far more than elsewhere.
     let usual = |i: usize| {
         let all = half_widths.iter().filter_map(|line| line.get(i).copied().flatten());
         Seconds(median(all.filter(|half_width| *half_width >= 0.0).collect()))

@@ -10,7 +10,7 @@ use std::ops::RangeInclusive;
 const BLACKMAN_HARRIS: [f64; 4] = [0.35875, -0.48829, 0.14128, -0.01168];
 /// Bins away from the tone whose median power is that of the signal below it: beyond the main lobe.
 const BESIDE: RangeInclusive<i32> = 6..=10;
-/// Power of a tone that is heard over that of what lies beside it.
+/// Power of a tone over that of what lies beside it, from which on it counts as found.
 const LEAST_RATIO: f64 = 50.0;
 
 /// A tone in the samples of one channel.
@@ -23,7 +23,7 @@ pub(super) struct Phasor {
 }
 
 impl Phasor {
-    /// Of a tone of so many cycles per sample; lost samples are NaN. `None` if it is not heard.
+    /// Of a tone of so many cycles per sample; lost samples are NaN. `None` if it is not found.
     pub(super) fn of(samples: &[f64], cycles: f64) -> Option<Self> {
         let whole = bridged(samples)?;
         let windowed: Vec<f64> = whole.iter().zip(window(samples.len())).map(|(x, w)| x * w).collect();
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_heard_has_none() {
+    fn noise_and_lost_samples_have_no_tone() {
         let mut random = Random(5);
         let noise: Vec<f64> = (0..2048).map(|_| random.sample()).collect();
         assert!(Phasor::of(&noise, 0.2).is_none() && Phasor::of(&[0.0; 2048], 0.2).is_none());

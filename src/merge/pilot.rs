@@ -39,8 +39,8 @@ pub struct PilotFusion {
     next: usize,
     /// The delays in the middle of the last blocks.
     track: DelayTrack,
-    /// Blocks in which the tone was not heard.
-    silent: usize,
+    /// Blocks in which the tone was not found.
+    missed: usize,
 }
 
 /// The tone, as it reaches the samples.
@@ -98,20 +98,20 @@ impl Pilot {
     }
 
     /// By how much each channel is later than the reference in the middle of a block, up to whole periods;
-    /// `None` if the tone is not heard in all.
+    /// `None` if the tone is not found in all.
     fn lags<'a>(&self, block: impl Iterator<Item = &'a [f64]>) -> Option<Vec<Estimate<FastPeriods>>> {
-        let heard = |(part, offset): (&[f64], &f64)| {
+        let phasor = |(part, offset): (&[f64], &f64)| {
             let own: Vec<f64> = part.iter().map(|x| x - offset).collect();
             Phasor::of(&own, self.cycles())
         };
-        let heard: Vec<Phasor> = block.zip(&self.offsets).map(heard).collect::<Option<_>>()?;
-        let own = heard[self.reference];
+        let found: Vec<Phasor> = block.zip(&self.offsets).map(phasor).collect::<Option<_>>()?;
+        let own = found[self.reference];
         let radian = self.period() * (1.0 / TAU);
         let lag = |(phasor, response): (&Phasor, &Complex<f64>)| {
             let turned = phasor.value / response * (own.value / self.responses[self.reference]).conj();
             Estimate { value: radian * -turned.arg(), sigma: radian * phasor.deviation.hypot(own.deviation) }
         };
-        Some(heard.iter().zip(&self.responses).map(lag).collect())
+        Some(found.iter().zip(&self.responses).map(lag).collect())
     }
 
     fn time_of(&self, frame: usize) -> Seconds {
@@ -156,7 +156,7 @@ impl PilotFusion {
             first: 0,
             next: 0,
             track,
-            silent: 0,
+            missed: 0,
         })
     }
 
@@ -165,9 +165,9 @@ impl PilotFusion {
         self.next / FRAMES
     }
 
-    /// Those of them of which the tone says nothing: the delays stay.
-    pub fn silent_blocks(&self) -> usize {
-        self.silent
+    /// Those of them in which the tone was not found: the delays stay.
+    pub fn missed_blocks(&self) -> usize {
+        self.missed
     }
 
     /// Takes the next samples of each channel, as many of all, and gives the outputs that depend on no later
@@ -211,12 +211,12 @@ impl PilotFusion {
         self.fusion.push(&next)
     }
 
-    /// Adds the delays in the middle of the next block. Those of a silent one are those before.
+    /// Adds the delays in the middle of the next block. Where the tone is not found they stay.
     fn measure(&mut self) {
         let (from, middle) = (self.next - self.first, self.next + FRAMES / 2);
         match self.pilot.lags(self.waiting.iter().map(|samples| &samples[from..from + FRAMES])) {
             Some(lags) => self.take(middle as f64, lags),
-            None => self.silent += 1,
+            None => self.missed += 1,
         }
         // The first ones take the place of those of the bank.
         let keep = if self.next == 0 { 0 } else { KEPT };
@@ -240,7 +240,7 @@ impl PilotFusion {
     }
 }
 
-/// Adds a value behind the last `keep` ones.
+/// Adds a value after the last `keep` ones.
 fn keep_last<T>(all: &mut Vec<T>, keep: usize, value: T) {
     all.drain(..all.len().saturating_sub(keep));
     all.push(value);
@@ -291,7 +291,7 @@ mod tests {
             let end = (first + cut).min(channels[0].len());
             samples.extend(fusion.push(&channels.clone().map(|all| all[first..end].to_vec())).unwrap());
         }
-        let blocks = [fusion.blocks(), fusion.silent_blocks()];
+        let blocks = [fusion.blocks(), fusion.missed_blocks()];
         let (last, quality) = fusion.finish().unwrap();
         samples.extend(last);
         (samples, quality, blocks)

@@ -301,7 +301,7 @@ fn a_stream_follows_a_pilot() {
     let found = snr_of(&desk, "y.wav");
     assert!(found > 50.0, "{found}");
     // Nothing is at this frequency: said, and the delays stay.
-    desk.warned(&with(&["--pilot", "5kHz"]), &["told nothing in 23 of 23 blocks"]);
+    desk.warned(&with(&["--pilot", "5kHz"]), &["not found in 23 of 23 blocks"]);
     assert!(snr_of(&desk, "y.wav") < 40.0);
     for (more, part) in [
         (&["--pilot", "0"][..], "above 0"),

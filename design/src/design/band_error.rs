@@ -7,8 +7,8 @@ use super::problem::Problem;
 use super::responses::impulse_responses;
 use hybank_core::bank::Bank;
 
-/// The power by which a better bank errs less: half a decibel. Below this another one is not worth its
-/// design.
+/// Ratio of error powers, half a decibel, from which on a second design is made and kept: it takes as long
+/// as the first one.
 const WORTHWHILE: f64 = 1.122;
 /// Samples that the filters see, at most: covariances of more take seconds.
 const MOST_SAMPLES: usize = 1024;
@@ -22,7 +22,7 @@ pub(super) struct BandError {
 }
 
 impl BandError {
-    /// `None` for filters that see more samples than are worth the work.
+    /// `None` for filters that see more than 1024 samples.
     ///
     /// # Errors
     /// As [`Problem::of_bank`].

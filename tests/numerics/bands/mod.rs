@@ -4,7 +4,7 @@
 //! The figures in `systems.json` were found with W written by hand as a stage of every front end, and judged
 //! by integrals over frequency in another program: the largest image of a tone in the band, and the SNR for
 //! white noise in the band. In system B the band is what limits a bank of the usual W (78 and 82 dB), and a
-//! sharp W is worth 25 dB more: its figures are the least ones that are wanted there, above the margin.
+//! sharp W gives 25 dB more: its figures are the least ones that are wanted there, above the margin.
 
 use crate::support::designed;
 use hybank::bank::Bank;

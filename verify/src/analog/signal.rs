@@ -4,7 +4,7 @@
 //! on. The stop edge lies where the samples cannot tell frequencies apart any more, at most 35 % above the
 //! band. This rule was chosen among 44 filters on twelve systems; Butterworth and Chebyshev 2 filters, less
 //! ripple and a stop edge at the mirror frequency lost up to 75 dB of SNR. A floor beyond the usual ones has
-//! its stop edge nearer and more poles: it is worth these where the band is what limits a bank.
+//! its stop edge nearer and more poles, for banks that the band limits.
 
 use super::families::Selectivity;
 use super::{AnalogError, StableFilter};

@@ -73,13 +73,13 @@ impl BoxPlant {
     /// Corners of the box, spread by the fractional parts of multiples of an irrational number for each
     /// converter.
     pub(super) fn corners(&self, count: usize) -> Vec<Combination> {
-        let choice = |corner: usize, (i, options): (usize, &Vec<ErrorOption>)| {
-            let share = (corner as f64 * (SPREAD * (i + 1) as f64).fract()).fract();
-            options.len().min(2) - 1 + (share * (options.len() - 1) as f64) as usize
+        let choice = |corner: usize, converter: usize| {
+            let others = self.options[converter].len() - 1;
+            let share = (corner as f64 * (SPREAD * (converter + 1) as f64).fract()).fract();
+            others.min(1) + (share * others as f64) as usize
         };
-        (0..count)
-            .map(|corner| self.options.iter().enumerate().map(|own| choice(corner, own)).collect())
-            .collect()
+        let converters = self.options.len();
+        (0..count).map(|corner| (0..converters).map(|i| choice(corner, i)).collect()).collect()
     }
 
     /// The errors of a combination.
